@@ -1,0 +1,171 @@
+//! The trait of executors.
+
+use crate::{Brick, BrickId, Frame, VolumeLayout};
+
+/// A picture in linear RGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Pixels from left to right.
+    pub width: u32,
+    /// Pixels from top to bottom.
+    pub height: u32,
+    /// Rows from the top, pixels from the left; `width * height` of them.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+/// What kind of device executes frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceKind {
+    /// This crate family's own CPU executor.
+    Software,
+    /// A GPU through wgpu.
+    Gpu,
+    /// A CPU that pretends to be a GPU, such as Mesa's llvmpipe, through wgpu.
+    CpuDevice,
+}
+
+/// Which device executes frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Device {
+    /// What kind it is.
+    pub kind: DeviceKind,
+    /// Its name for people.
+    pub name: String,
+}
+
+/// What a draw returns.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// The picture.
+    pub image: Image,
+    /// Seconds that the device itself measured for the draw, where it can.
+    pub device_seconds: Option<f64>,
+}
+
+/// Why bricks could not be made resident. The backend holds what it held before.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UploadError {
+    /// No volume was set.
+    #[error("upload of brick {id:?}: no volume layout was set")]
+    NoVolume {
+        /// The first brick of the upload.
+        id: BrickId,
+    },
+    /// A brick that does not fit the layout.
+    #[error("brick {id:?}: {found}, expected {expected}")]
+    Mismatch {
+        /// The brick.
+        id: BrickId,
+        /// What it has.
+        found: String,
+        /// What the layout asks for.
+        expected: String,
+    },
+    /// The device's memory or its limits do not allow more bricks.
+    #[error("brick pool: {required} bytes are needed, the device allows {max}")]
+    PoolFull {
+        /// Bytes that would be resident.
+        required: u64,
+        /// Bytes that can be.
+        max: u64,
+    },
+    /// The device failed.
+    #[error("device: {0}")]
+    Device(String),
+}
+
+/// Why a frame could not be drawn.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DrawError {
+    /// No volume was set.
+    #[error("draw: no volume layout was set")]
+    NoVolume,
+    /// A placed brick is not resident.
+    #[error("draw: brick {id:?} is not resident")]
+    NotResident {
+        /// The brick.
+        id: BrickId,
+    },
+    /// A placed brick's corner is not where its level allows.
+    #[error(
+        "draw: brick {id:?} of level {level} stands at cell {found:?}, expected multiples of its size inside the volume"
+    )]
+    Misplaced {
+        /// The brick.
+        id: BrickId,
+        /// Its level.
+        level: u32,
+        /// Its first cell.
+        found: [u32; 3],
+    },
+    /// The picture is empty or larger than the device draws.
+    #[error("draw: picture of {width}x{height} pixels, expected 1x1 to {max}x{max}")]
+    Size {
+        /// Pixels from left to right.
+        width: u32,
+        /// Pixels from top to bottom.
+        height: u32,
+        /// Most pixels per axis.
+        max: u32,
+    },
+    /// The device failed.
+    #[error("device: {0}")]
+    Device(String),
+}
+
+/// Executes frames. Holds the bricks of one volume at a time.
+pub trait Backend: Send {
+    /// The device that executes.
+    fn device(&self) -> Device;
+
+    /// Makes `layout` the volume that bricks belong to, and forgets all bricks.
+    ///
+    /// # Errors
+    /// When the device cannot hold bricks of this layout at all.
+    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError>;
+
+    /// Whether a brick is resident.
+    fn is_resident(&self, id: BrickId) -> bool;
+
+    /// Makes bricks resident, beside those that are; a brick of the same name is replaced.
+    ///
+    /// # Errors
+    /// When a brick does not fit the layout or the device. No brick of this call is resident then.
+    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError>;
+
+    /// Bytes of device memory that the bricks take, with all that the backend keeps per brick.
+    fn resident_bytes(&self) -> u64;
+
+    /// Draws a frame and reads the picture back.
+    ///
+    /// # Errors
+    /// When a brick is missing or misplaced, or the device fails.
+    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError>;
+}
+
+/// Checks that every backend makes before it draws: placement and size.
+///
+/// # Errors
+/// [`DrawError::Size`] or [`DrawError::Misplaced`].
+pub fn check_frame(frame: &Frame<'_>, layout: &VolumeLayout, max_size: u32) -> Result<(), DrawError> {
+    let (width, height) = (frame.width, frame.height);
+    if !(1..=max_size).contains(&width) || !(1..=max_size).contains(&height) {
+        return Err(DrawError::Size { width, height, max: max_size });
+    }
+    for brick in frame.bricks {
+        let size = layout
+            .brick_cells
+            .checked_shl(brick.level)
+            .filter(|&size| size >> brick.level == layout.brick_cells);
+        let placed = size.is_some_and(|size| {
+            (0..3).all(|axis| {
+                let first = brick.first_cell[axis];
+                first % size == 0 && first < layout.cells[axis] && first.checked_add(size).is_some()
+            })
+        });
+        if !placed {
+            return Err(DrawError::Misplaced { id: brick.id, level: brick.level, found: brick.first_cell });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,1 @@
+//! Files in, files out: volumes, images, scene files, transfer functions.

@@ -1,0 +1,1 @@
+//! The octree over a voxel pyramid: selection filters, cuts, visibility order.

@@ -1,0 +1,1 @@
+//! Voxel pyramids: levels, bricks, and exact statistics of every node.

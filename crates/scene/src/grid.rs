@@ -1,0 +1,185 @@
+//! A voxel grid: samples at integer coordinates times spacing, trilinear in between.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use crate::samples::{Sample, SampleType, Samples};
+
+/// A regular grid of samples of any size and type.
+#[derive(Clone, Debug)]
+pub struct VoxelGrid {
+    dims: [usize; 3],
+    spacing: DVec3,
+    samples: Samples,
+}
+
+/// One thing that is wrong with a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Defect {
+    /// An axis without samples.
+    EmptyAxis {
+        /// 0, 1, 2 for x, y, z.
+        axis: usize,
+    },
+    /// The product of the dims does not fit in memory's address range.
+    TooManySamples {
+        /// The dims as given.
+        dims: [usize; 3],
+    },
+    /// The number of samples is not the product of the dims.
+    SampleCount {
+        /// Samples given.
+        found: usize,
+        /// The product of the dims.
+        expected: usize,
+    },
+    /// A spacing that is not positive and finite.
+    Spacing {
+        /// 0, 1, 2 for x, y, z.
+        axis: usize,
+        /// The spacing as given.
+        found: f64,
+    },
+}
+
+impl fmt::Display for Defect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EmptyAxis { axis } => write!(f, "axis {axis} has 0 samples, expected at least 1"),
+            Self::TooManySamples { dims: [x, y, z] } => {
+                write!(f, "{x} x {y} x {z} samples, more than can be addressed")
+            }
+            Self::SampleCount { found, expected } => write!(f, "{found} samples, expected {expected}"),
+            Self::Spacing { axis, found } => {
+                write!(f, "spacing {found} along axis {axis}, expected a positive finite number")
+            }
+        }
+    }
+}
+
+/// Why a [`VoxelGrid`] could not be made: everything that is wrong with it, at least one defect.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("voxel grid: {}", .defects.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+pub struct Error {
+    /// All defects found.
+    pub defects: Vec<Defect>,
+}
+
+/// Lists what would be wrong with a grid of this shape.
+pub fn defects(dims: [usize; 3], spacing: DVec3, num_samples: usize) -> Vec<Defect> {
+    let mut defects = Vec::new();
+    defects.extend((0..3).filter(|&axis| dims[axis] == 0).map(|axis| Defect::EmptyAxis { axis }));
+    match dims[0].checked_mul(dims[1]).and_then(|plane| plane.checked_mul(dims[2])) {
+        None => defects.push(Defect::TooManySamples { dims }),
+        Some(expected) if expected != num_samples => {
+            defects.push(Defect::SampleCount { found: num_samples, expected });
+        }
+        Some(_) => {}
+    }
+    for axis in 0..3 {
+        let found = spacing[axis];
+        if !(found > 0.0 && found.is_finite()) {
+            defects.push(Defect::Spacing { axis, found });
+        }
+    }
+    defects
+}
+
+impl VoxelGrid {
+    /// A grid of `dims` samples (x, y, z; x fastest in memory), `spacing` apart in world units.
+    ///
+    /// # Errors
+    /// When dims, spacing and samples do not make a grid; the error lists every defect.
+    pub fn new(dims: [usize; 3], spacing: DVec3, samples: impl Into<Samples>) -> Result<Self, Error> {
+        let samples = samples.into();
+        let defects = defects(dims, spacing, samples.len());
+        if defects.is_empty() { Ok(Self { dims, spacing, samples }) } else { Err(Error { defects }) }
+    }
+
+    /// Samples along x, y, z; each at least 1.
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// World distance of neighbouring samples along x, y, z.
+    pub fn spacing(&self) -> DVec3 {
+        self.spacing
+    }
+
+    /// The samples, x fastest.
+    pub fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    /// The type of a sample.
+    pub fn sample_type(&self) -> SampleType {
+        self.samples.sample_type()
+    }
+
+    /// Number of samples.
+    pub fn num_samples(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// World position of the last sample; the domain is `[0, extent]`.
+    pub fn extent(&self) -> DVec3 {
+        DVec3::from_array(self.dims.map(|n| (n - 1) as f64)) * self.spacing
+    }
+
+    /// Index of sample `(x, y, z)` in the flat array.
+    #[inline]
+    pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.dims[1] + y) * self.dims[0] + x
+    }
+
+    /// Smallest and largest finite value of a channel; `None` if every sample is blank.
+    ///
+    /// # Panics
+    /// When the grid has no such channel.
+    pub fn value_range(&self, channel: usize) -> Option<[f64; 2]> {
+        assert!(channel < self.sample_type().channels(), "channel {channel} of {}", self.sample_type());
+        fn range<T: Sample>(values: &[T], channel: usize) -> Option<[f64; 2]> {
+            let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+            for value in values {
+                let value = value.channel(channel);
+                if value.is_finite() {
+                    range = [range[0].min(value), range[1].max(value)];
+                }
+            }
+            (range[0] <= range[1]).then_some(range)
+        }
+        crate::for_samples!(&self.samples, |values| range(values, channel))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_defect_is_listed() {
+        let error = VoxelGrid::new([0, 2, 3], DVec3::new(1.0, f64::NAN, -1.0), vec![1u8]).unwrap_err();
+        assert_eq!(error.defects.len(), 4, "{error}");
+        assert_eq!(error.defects[0], Defect::EmptyAxis { axis: 0 });
+        assert_eq!(error.defects[1], Defect::SampleCount { found: 1, expected: 0 });
+        assert!(matches!(error.defects[2], Defect::Spacing { axis: 1, .. }));
+        assert_eq!(error.defects[3], Defect::Spacing { axis: 2, found: -1.0 });
+    }
+
+    #[test]
+    fn dims_that_overflow_are_a_defect() {
+        let huge = usize::MAX / 2;
+        let error = VoxelGrid::new([huge, 3, 1], DVec3::ONE, Vec::<f32>::new()).unwrap_err();
+        assert_eq!(error.defects, [Defect::TooManySamples { dims: [huge, 3, 1] }]);
+    }
+
+    #[test]
+    fn range_ignores_blank_samples() {
+        let values = vec![f32::NAN, -2.0, f32::INFINITY, 5.0];
+        let grid = VoxelGrid::new([2, 2, 1], DVec3::ONE, values).unwrap();
+        assert_eq!(grid.value_range(0), Some([-2.0, 5.0]));
+        let blank = VoxelGrid::new([1, 1, 1], DVec3::ONE, vec![f64::NAN]).unwrap();
+        assert_eq!(blank.value_range(0), None);
+    }
+}

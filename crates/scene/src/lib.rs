@@ -1,0 +1,28 @@
+//! What Volery draws and from where: a [`VoxelGrid`], a [`Camera`], a [`TransferFunction`].
+//!
+//! Plain data and its validation, in `f64`; every other crate of Volery speaks in these types.
+//!
+//! # Conventions
+//! - *World*: sample `(i, j, k)` of a grid lies at `(i, j, k) * spacing`, the first at the origin. The
+//!   domain is the hull of the samples, `[0, (n - 1) * spacing]`; inside, the field is trilinear.
+//! - *Blank*: a sample that is NaN or infinite. A cell with a blank corner holds no matter.
+//! - *Light*: emission and absorption, `I = ∫ c s T dt + T_end * background` with `T = exp(-∫ s)`, where
+//!   `c` is the straight colour and `s` the extinction per world length.
+//! - *Pictures*: row 0 is the top; a pixel's ray goes through its centre; colour is linear, without gamma.
+//!
+//! # Non-goals
+//! No file formats, no pyramid, no pictures: see `volery-io`, `volery-pyramid`, `volery-frame`.
+
+pub mod camera;
+pub mod grid;
+pub mod samples;
+pub mod transfer;
+
+pub use camera::{Camera, Projection, Ray, RayGrid};
+pub use grid::VoxelGrid;
+pub use samples::{Array, Sample, SampleType, Samples};
+pub use transfer::{ControlPoint, TransferFunction};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

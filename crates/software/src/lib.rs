@@ -1,0 +1,1 @@
+//! Executes a frame on the CPU: all cores, SIMD, no driver.

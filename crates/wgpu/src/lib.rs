@@ -1,0 +1,1 @@
+//! Executes a frame on a GPU through wgpu.

@@ -1,0 +1,85 @@
+use volery_scene::SampleType;
+
+use super::*;
+
+#[test]
+fn the_signal_of_marschner_and_lobb_has_its_published_values() {
+    // On the axis r = 0 the ring term is cos(12π) = 1; at z = -1 the sine is -1.
+    assert!((marschner_lobb_at(DVec3::new(0.0, 0.0, -1.0)) - 1.0).abs() < 1e-12);
+    assert!((marschner_lobb_at(DVec3::ZERO) - 0.6).abs() < 1e-12);
+    // On the circle r = 1: cos(2π f cos(π/2)) = 1 again.
+    assert!((marschner_lobb_at(DVec3::new(0.6, 0.8, 1.0)) - 0.2).abs() < 1e-12);
+    // cos(πr/2) = 1/24 gives cos(π/2) = 0.
+    let r = 2.0 / PI * (1.0f64 / 24.0).acos();
+    assert!((marschner_lobb_at(DVec3::new(r, 0.0, 0.0)) - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn quantised_signal_is_the_signal() {
+    let (float, byte) = (marschner_lobb(9), marschner_lobb_u8(9));
+    for index in 0..float.num_samples() {
+        let difference = 255.0 * float.samples().value(index, 0) - byte.samples().value(index, 0);
+        assert!(difference.abs() <= 0.5001, "sample {index}: {difference}");
+    }
+    assert_eq!(marschner_lobb(1).num_samples(), 1);
+}
+
+#[test]
+fn a_ramp_is_linear_in_world_units() {
+    let spacing = DVec3::new(1.0, 2.0, 0.5);
+    let ramp = ramp([3, 4, 5], spacing, DVec3::new(1.0, -2.0, 4.0), 10.0);
+    assert_eq!(ramp.sample_type(), SampleType::F64);
+    assert_eq!(ramp.samples().value(ramp.index([2, 3, 4]), 0), 10.0 + 2.0 - 12.0 + 8.0);
+}
+
+#[test]
+fn a_half_space_is_on_one_side() {
+    let step = half_space([4, 4, 4], DVec3::ONE, DVec3::X, 2.0);
+    for x in 0..4 {
+        let value = step.samples().value(step.index([x, 1, 2]), 0);
+        assert_eq!(value, if x >= 2 { 255.0 } else { 0.0 });
+    }
+}
+
+#[test]
+fn a_head_has_its_tissues_where_they_belong() {
+    let dims = [65, 81, 81];
+    let head = head(dims, DVec3::ONE);
+    let at = |x: f64, y: f64, z: f64| {
+        let index = |n: usize, p: f64| ((p + 1.0) / 2.0 * (n - 1) as f64).round() as usize;
+        head.samples().value(head.index([index(65, x), index(81, y), index(81, z)]), 0)
+    };
+    assert_eq!(at(-1.0, -1.0, 1.0), -1000.0, "air around");
+    assert_eq!(at(0.0, 0.5, 0.3), 38.0, "brain");
+    assert_eq!(at(0.12, 0.0, 0.18), 6.0, "left ventricle");
+    assert_eq!(at(-0.12, 0.0, 0.18), 6.0, "right ventricle");
+    let crown: Vec<_> = (0..81).map(|z| head.samples().value(head.index([32, 41, z]), 0)).collect();
+    let bone = crown.iter().filter(|&&v| v > 700.0).count();
+    assert!(bone >= 3, "{bone} samples of skull above the brain");
+    assert_eq!(head.sample_type(), SampleType::I16);
+    let byte = head_u8(dims, DVec3::ONE);
+    assert_eq!(byte.value_range(0), Some([0.0, 210.0]));
+}
+
+#[test]
+fn noise_is_flat_and_has_no_neighbours() {
+    let noise = noise([16, 16, 16], 7);
+    let values: Vec<f64> = (0..4096).map(|i| noise.samples().value(i, 0)).collect();
+    let mean = values.iter().sum::<f64>() / 4096.0;
+    // Standard error of the mean: 73.9 / 64 = 1.15.
+    assert!((mean - 127.5).abs() < 4.0 * 1.15, "mean {mean}");
+    let covariance = values.windows(2).map(|w| (w[0] - mean) * (w[1] - mean)).sum::<f64>() / 4095.0;
+    let correlation = covariance / (255.0 * 255.0 / 12.0);
+    assert!(correlation.abs() < 4.0 / 64.0, "correlation {correlation}");
+    assert_eq!(hash(0), 0xe220_a839_7b1d_cdaf, "first output of SplitMix64 with seed 0");
+}
+
+#[test]
+fn holes_have_the_share_asked_for() {
+    let grid = holes([16, 16, 16], 3, 0.1);
+    let blank = (0..4096).filter(|&i| !grid.samples().value(i, 0).is_finite()).count();
+    let infinite = (0..4096).filter(|&i| grid.samples().value(i, 0).is_infinite()).count();
+    // 409.6 expected, standard deviation 19.2.
+    assert!((333..=487).contains(&blank), "{blank} blank");
+    assert!(infinite > 0 && infinite < blank / 2, "{infinite} infinite");
+}

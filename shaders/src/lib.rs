@@ -1,0 +1,1 @@
+//! WGSL of Volery, validated and reflected by naga when it is built.

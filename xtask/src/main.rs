@@ -1,0 +1,2 @@
+//! Tests, benches and checks of the workspace.
+fn main() {}
