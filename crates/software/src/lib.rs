@@ -1,1 +1,173 @@
-//! Executes a frame on the CPU: all cores, SIMD, no driver.
+//! Executes frames on the CPU: all cores, SIMD, no driver.
+//!
+//! # Method
+//! The picture is cut into tiles, which rayon hands to the cores. A tile knows which bricks its rays can
+//! meet, in visibility order. Its rays go in packets of 16, four by four pixels, one ray per SIMD lane;
+//! [`fearless_simd`] chooses AVX-512, AVX2, SSE, NEON or WebAssembly when the program runs.
+//!
+//! All rays of a packet meet the same brick together, so the brick's address, level and size are scalars.
+//! The ray's entry into a brick is computed in f64 and only then rounded to f32 relative to the brick, so
+//! that an eye 1e6 cells away loses nothing. In the brick (see `walk`) each lane goes from cell to cell of
+//! its own: within a cell the trilinear field along the ray is a cubic, evaluated at the cell's entry, middle
+//! and exit from one fetch of eight corners, and the two halves are integrated through the
+//! [`IntegratedTransfer`](volery_frame::IntegratedTransfer).
+//!
+//! Empty space costs little: a brick keeps the range of every block of 4x4x4 cells, a frame marks the blocks
+//! that are transparent under its transfer function, and lanes leap over those.
+//!
+//! # Error
+//! A half cell is integrated as if the field were linear over it: of second order in the size of a cell, and
+//! nothing at all along the axes, where the field is linear. Values are rounded to the table's bins (at most
+//! 1/8192 of the range). A ray ends when less than [`MIN_TRANSMITTANCE`] of what lies behind can come
+//! through, and that rest is dropped. Sums are in f32.
+//!
+//! # Guarantees
+//! The same bits for any number of threads. No `unsafe`.
+
+mod brick;
+mod math;
+mod packet;
+mod texel;
+mod tile;
+mod walk;
+
+use std::collections::HashMap;
+
+use fearless_simd::Level;
+use volery_frame::backend::check_frame;
+use volery_frame::{
+    Backend, Brick, BrickId, Device, DeviceKind, DrawError, Drawn, Frame, Image, Texels, UploadError,
+    VolumeLayout,
+};
+
+use crate::brick::StoredBrick;
+use crate::texel::Pool;
+
+/// A ray ends when its transmittance falls below this.
+pub const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
+
+/// Most pixels of a picture per axis.
+pub const MAX_SIZE: u32 = 65_536;
+
+/// Most cells of a brick per axis: addresses of samples are exact in f32.
+pub const MAX_BRICK_CELLS: u32 = 254;
+
+/// The CPU executor. Uses the current rayon thread pool.
+#[derive(Debug)]
+pub struct SoftwareBackend {
+    level: Level,
+    volume: Option<(VolumeLayout, Pool)>,
+}
+
+impl Default for SoftwareBackend {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl SoftwareBackend {
+    /// An executor for the best instruction set of this machine.
+    pub fn new() -> Self {
+        Self { level: Level::new(), volume: None }
+    }
+}
+
+impl Backend for SoftwareBackend {
+    fn device(&self) -> Device {
+        let name = format!("{:?}", self.level);
+        let set = name.split('(').next().unwrap_or_default().to_lowercase();
+        let threads = rayon::current_num_threads();
+        let plural = if threads == 1 { "" } else { "s" };
+        Device { kind: DeviceKind::Software, name: format!("CPU, {set}, {threads} thread{plural}") }
+    }
+
+    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
+        if !(1..=MAX_BRICK_CELLS).contains(&layout.brick_cells) {
+            return Err(UploadError::Device(format!(
+                "bricks of {} cells, expected 1 to {MAX_BRICK_CELLS}",
+                layout.brick_cells
+            )));
+        }
+        self.volume = Some((*layout, Pool::new(layout.texel)));
+        Ok(())
+    }
+
+    fn is_resident(&self, id: BrickId) -> bool {
+        self.volume.as_ref().is_some_and(|(_, pool)| pool.contains(id))
+    }
+
+    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
+        let Some(first) = bricks.first() else { return Ok(()) };
+        let (layout, pool) = self.volume.as_mut().ok_or(UploadError::NoVolume { id: first.id })?;
+        bricks.iter().try_for_each(|brick| brick::check(brick, layout))?;
+        pool.insert(bricks);
+        Ok(())
+    }
+
+    fn resident_bytes(&self) -> u64 {
+        self.volume.as_ref().map_or(0, |(_, pool)| pool.bytes())
+    }
+
+    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
+        let (layout, pool) = self.volume.as_ref().ok_or(DrawError::NoVolume)?;
+        check_frame(frame, layout, MAX_SIZE)?;
+        let pixels = match pool {
+            Pool::U8(bricks) => tile::draw(self.level, frame, layout, bricks),
+            Pool::U16(bricks) => tile::draw(self.level, frame, layout, bricks),
+            Pool::F32(bricks) => tile::draw(self.level, frame, layout, bricks),
+        }?;
+        let image = Image { width: frame.width, height: frame.height, pixels };
+        Ok(Drawn { image, device_seconds: None })
+    }
+}
+
+impl Pool {
+    fn new(texel: volery_frame::TexelType) -> Self {
+        match texel {
+            volery_frame::TexelType::U8 => Self::U8(HashMap::new()),
+            volery_frame::TexelType::U16 => Self::U16(HashMap::new()),
+            volery_frame::TexelType::F32 => Self::F32(HashMap::new()),
+        }
+    }
+
+    fn contains(&self, id: BrickId) -> bool {
+        match self {
+            Self::U8(bricks) => bricks.contains_key(&id),
+            Self::U16(bricks) => bricks.contains_key(&id),
+            Self::F32(bricks) => bricks.contains_key(&id),
+        }
+    }
+
+    /// All bricks have been checked against the layout.
+    fn insert(&mut self, new: &[Brick<'_>]) {
+        for brick in new {
+            match (&mut *self, brick.texels) {
+                (Self::U8(bricks), Texels::U8(texels)) => {
+                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels));
+                }
+                (Self::U16(bricks), Texels::U16(texels)) => {
+                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels));
+                }
+                (Self::F32(bricks), Texels::F32(texels)) => {
+                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels));
+                }
+                _ => unreachable!("the type was checked against the layout"),
+            }
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        fn sum<T: texel::Texel>(bricks: &HashMap<BrickId, StoredBrick<T>>) -> u64 {
+            bricks.values().map(StoredBrick::bytes).sum()
+        }
+        match self {
+            Self::U8(bricks) => sum(bricks),
+            Self::U16(bricks) => sum(bricks),
+            Self::F32(bricks) => sum(bricks),
+        }
+    }
+}
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,100 @@
+//! A brick as the executor keeps it: samples, and the range of every block of cells.
+
+use volery_frame::{Brick, IntegratedTransfer, UploadError, VolumeLayout};
+
+use crate::texel::Texel;
+
+/// Cells of a block per axis. A smaller block fits matter closer, a larger one is leapt over faster.
+pub(crate) const BLOCK_CELLS: u32 = 4;
+
+/// The samples of one octree node.
+#[derive(Debug)]
+pub(crate) struct StoredBrick<T> {
+    /// Along x, y, z.
+    pub(crate) samples: [u32; 3],
+    pub(crate) texels: Box<[T]>,
+    /// Blocks along x, y, z.
+    pub(crate) blocks: [u32; 3],
+    /// Smallest and largest texel that is not blank, per block, x fastest; reversed when all are blank.
+    ranges: Box<[[T; 2]]>,
+}
+
+/// Whether a brick fits a layout.
+pub(crate) fn check(brick: &Brick<'_>, layout: &VolumeLayout) -> Result<(), UploadError> {
+    let mismatch =
+        |found: String, expected: String| Err(UploadError::Mismatch { id: brick.id, found, expected });
+    let most = layout.brick_cells + 1;
+    if brick.texels.texel_type() != layout.texel {
+        return mismatch(format!("texels {:?}", brick.texels.texel_type()), format!("{:?}", layout.texel));
+    }
+    if !brick.samples.iter().all(|samples| (1..=most).contains(samples)) {
+        return mismatch(format!("{:?} samples", brick.samples), format!("1 to {most} per axis"));
+    }
+    let count: usize = brick.samples.iter().map(|&n| n as usize).product();
+    if brick.texels.len() != count {
+        return mismatch(format!("{} texels", brick.texels.len()), format!("{count}"));
+    }
+    Ok(())
+}
+
+impl<T: Texel> StoredBrick<T> {
+    /// `texels` are as many as `samples` say.
+    pub(crate) fn new(samples: [u32; 3], texels: &[T]) -> Self {
+        let blocks = samples.map(|n| (n - 1).div_ceil(BLOCK_CELLS));
+        let mut ranges = Vec::with_capacity(blocks.iter().product::<u32>() as usize);
+        for z in 0..blocks[2] {
+            for y in 0..blocks[1] {
+                for x in 0..blocks[0] {
+                    ranges.push(range(samples, texels, [x, y, z].map(|block| block * BLOCK_CELLS)));
+                }
+            }
+        }
+        Self { samples, texels: texels.into(), blocks, ranges: ranges.into() }
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        let Self { samples: _, texels, blocks: _, ranges } = self;
+        (size_of::<Self>() + size_of_val::<[T]>(texels) + size_of_val::<[[T; 2]]>(ranges)) as u64
+    }
+
+    /// Marks each block that may hold matter with 1, others with 0; false when there is none at all.
+    pub(crate) fn occupancy(
+        &self,
+        transfer: &IntegratedTransfer,
+        bin_from_texel: [f32; 2],
+        marks: &mut Vec<u8>,
+    ) -> bool {
+        let [scale, offset] = bin_from_texel;
+        // Bins are rounded to nearest when a ray is classified, hence the half bin on either side.
+        let mark = |[low, high]: &[T; 2]| {
+            let (low, high) = (low.to_f32() * scale + offset, high.to_f32() * scale + offset);
+            u8::from(!transfer.is_transparent(low - 0.5, high + 0.5) && low <= high)
+        };
+        marks.clear();
+        marks.extend(self.ranges.iter().map(mark));
+        marks.contains(&1)
+    }
+}
+
+/// Smallest and largest texel of a block, its upper faces included.
+fn range<T: Texel>(samples: [u32; 3], texels: &[T], first: [u32; 3]) -> [T; 2] {
+    let end: [usize; 3] =
+        std::array::from_fn(|axis| (first[axis] + BLOCK_CELLS + 1).min(samples[axis]) as usize);
+    let first = first.map(|x| x as usize);
+    let [nx, ny, _] = samples.map(|n| n as usize);
+    let mut range: Option<[T; 2]> = None;
+    for z in first[2]..end[2] {
+        for y in first[1]..end[1] {
+            let row = (z * ny + y) * nx;
+            for &texel in &texels[row + first[0]..row + end[0]] {
+                if !texel.is_blank() {
+                    let [low, high] = range.unwrap_or([texel, texel]);
+                    let low = if texel < low { texel } else { low };
+                    let high = if texel > high { texel } else { high };
+                    range = Some([low, high]);
+                }
+            }
+        }
+    }
+    range.unwrap_or_else(T::empty_range)
+}

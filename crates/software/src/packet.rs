@@ -1,0 +1,118 @@
+//! Packets of 16 rays, and where they enter and leave bricks.
+
+use fearless_simd::{f32x16, f64x8, mask32x16, prelude::*};
+use glam::DVec3;
+use volery_scene::RayGrid;
+
+/// Pixels of a packet per axis; a lane is `column + 4 * row`.
+pub(crate) const PACKET: u32 = 4;
+
+/// Sixteen f64, one per lane.
+type Wide<S> = [f64x8<S>; 2];
+
+/// Rays of four by four pixels, in finest cells: `origin + t * direction`, with `t` in unit lengths.
+pub(crate) struct Packet<S: Simd> {
+    origin: [Wide<S>; 3],
+    direction: [Wide<S>; 3],
+    inverse: [Wide<S>; 3],
+    /// `direction` and `inverse` in f32, the latter finite.
+    narrow_direction: [f32x16<S>; 3],
+    narrow_inverse: [f32x16<S>; 3],
+}
+
+/// What a packet does in one brick.
+pub(crate) struct Span<S: Simd> {
+    /// Where the rays enter, in cells of the brick from its first sample.
+    pub(crate) entry: [f32x16<S>; 3],
+    /// Cells of the brick per unit length.
+    pub(crate) direction: [f32x16<S>; 3],
+    /// `1 / direction`, finite.
+    pub(crate) inverse: [f32x16<S>; 3],
+    /// Unit lengths from entry to exit; meaningful in `active` lanes.
+    pub(crate) length: f32x16<S>,
+    /// Lanes that meet the brick.
+    pub(crate) active: mask32x16<S>,
+}
+
+impl<S: Simd> Packet<S> {
+    /// The rays of the packet whose upper left pixel is `(column, row)`. Pixels outside the picture are as
+    /// good as others.
+    #[inline(always)]
+    pub(crate) fn new(
+        simd: S,
+        rays: &RayGrid,
+        spacing: DVec3,
+        unit_length: f64,
+        column: u32,
+        row: u32,
+    ) -> Self {
+        let mut origin = [[0.0_f64; 16]; 3];
+        let mut direction = [[0.0_f64; 16]; 3];
+        for lane in 0..16 {
+            let ray = rays.pixel(column + lane % PACKET, row + lane / PACKET);
+            let o = ray.origin / spacing;
+            let d = ray.direction * unit_length / spacing;
+            for axis in 0..3 {
+                origin[axis][lane as usize] = o[axis];
+                // A ray that stands still along an axis creeps forward, so that 1 / d exists: by 1e-290 of a
+                // cell over any distance that f32 can tell.
+                direction[axis][lane as usize] = if d[axis].abs() < 1e-290 { 1e-290 } else { d[axis] };
+            }
+        }
+        let wide = |values: &[f64; 16]| [0, 8].map(|half| f64x8::from_slice(simd, &values[half..half + 8]));
+        let narrow =
+            |values: &[f64; 16]| f32x16::from_slice(simd, &values.map(|x| (x as f32).clamp(-1e30, 1e30)));
+        let inverse = direction.map(|d| d.map(f64::recip));
+        Self {
+            origin: [0, 1, 2].map(|axis| wide(&origin[axis])),
+            direction: [0, 1, 2].map(|axis| wide(&direction[axis])),
+            inverse: [0, 1, 2].map(|axis| wide(&inverse[axis])),
+            narrow_direction: [0, 1, 2].map(|axis| narrow(&direction[axis])),
+            narrow_inverse: [0, 1, 2].map(|axis| narrow(&inverse[axis])),
+        }
+    }
+
+    /// Meets the packet with the box `low..high` in finest cells, whose samples are `2^level` apart. `None`
+    /// if no lane among `wanted` has a piece of ray in it. Boxes that share a face share the depth of it, to
+    /// the last bit.
+    #[inline(always)]
+    pub(crate) fn meet(
+        &self,
+        simd: S,
+        [low, high]: [[f64; 3]; 2],
+        level: u32,
+        wanted: mask32x16<S>,
+    ) -> Option<Span<S>> {
+        let mut near = [f64x8::splat(simd, 0.0); 2];
+        let mut far = [f64x8::splat(simd, f64::INFINITY); 2];
+        for axis in 0..3 {
+            for half in 0..2 {
+                let (o, inverse) = (self.origin[axis][half], self.inverse[axis][half]);
+                let (a, b) = ((low[axis] - o) * inverse, (high[axis] - o) * inverse);
+                near[half] = near[half].max(a.min(b));
+                far[half] = far[half].min(a.max(b));
+            }
+        }
+        let length: f32x16<S> = simd.narrow_f64x8(far[0] - near[0], far[1] - near[1]);
+        let active = length.simd_gt(0.0) & wanted;
+        if active.all_false() {
+            return None;
+        }
+        let scale = 0.5_f64.powi(level as i32);
+        let entry = [0, 1, 2].map(|axis| {
+            let [a, b] = [0, 1].map(|half| {
+                let o = self.origin[axis][half] - low[axis];
+                (self.direction[axis][half].mul_add(near[half], o)) * scale
+            });
+            simd.narrow_f64x8(a, b)
+        });
+        let (shrink, grow) = (scale as f32, (1_u64 << level) as f32);
+        Some(Span {
+            entry,
+            direction: self.narrow_direction.map(|d| d * shrink),
+            inverse: self.narrow_inverse.map(|i| i * grow),
+            length,
+            active,
+        })
+    }
+}

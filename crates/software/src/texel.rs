@@ -1,0 +1,158 @@
+//! Texel types, and how a packet fetches the eight corners of a cell.
+
+use std::collections::HashMap;
+
+use fearless_simd::{f32x16, i32x16, prelude::*, u32x16};
+use volery_frame::BrickId;
+
+use crate::brick::StoredBrick;
+
+/// Resident bricks, all of one type.
+#[derive(Debug)]
+pub(crate) enum Pool {
+    U8(HashMap<BrickId, StoredBrick<u8>>),
+    U16(HashMap<BrickId, StoredBrick<u16>>),
+    F32(HashMap<BrickId, StoredBrick<f32>>),
+}
+
+/// A texel type that the executor stores and samples.
+pub(crate) trait Texel: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 'static {
+    /// Whether a texel can be blank (NaN).
+    const CAN_BE_BLANK: bool;
+
+    fn to_f32(self) -> f32;
+
+    fn is_blank(self) -> bool;
+
+    /// The range of no texel at all: the largest first.
+    fn empty_range() -> [Self; 2];
+
+    /// The corners of one cell per lane. `rows` are four views of one brick, of the same length: the row of
+    /// the cell's lower corner, the row above it, and the same two one slice further; `at` is the offset of
+    /// the lower corner in a row. Corner `x + 2 y + 4 z` is at that index.
+    fn corners<S: Simd>(simd: S, rows: [&[Self]; 4], at: i32x16<S>) -> [f32x16<S>; 8];
+}
+
+/// The four bytes of each lane as floats.
+#[inline(always)]
+fn bytes<S: Simd>(simd: S, packed: u32x16<S>) -> [f32x16<S>; 4] {
+    let mask = u32x16::splat(simd, 0xff);
+    [packed & mask, (packed >> 8) & mask, (packed >> 16) & mask, packed >> 24].map(|byte| byte.to_float())
+}
+
+/// The two halves of each lane as floats.
+#[inline(always)]
+fn halves<S: Simd>(simd: S, packed: u32x16<S>) -> [f32x16<S>; 2] {
+    let mask = u32x16::splat(simd, 0xffff);
+    [packed & mask, packed >> 16].map(|half| half.to_float())
+}
+
+impl Texel for u8 {
+    const CAN_BE_BLANK: bool = false;
+
+    #[inline(always)]
+    fn to_f32(self) -> f32 {
+        f32::from(self)
+    }
+
+    #[inline(always)]
+    fn is_blank(self) -> bool {
+        false
+    }
+
+    fn empty_range() -> [Self; 2] {
+        [u8::MAX, u8::MIN]
+    }
+
+    #[inline(always)]
+    fn corners<S: Simd>(simd: S, rows: [&[u8]; 4], at: i32x16<S>) -> [f32x16<S>; 8] {
+        // One length for all rows, so that one check of bounds serves all.
+        let [r0, r1, r2, r3] = rows;
+        let n = r0.len();
+        let (r1, r2, r3) = (&r1[..n], &r2[..n], &r3[..n]);
+        let at: [i32; 16] = at.into();
+        let (mut near, mut far) = ([0_u32; 16], [0_u32; 16]);
+        for lane in 0..16 {
+            let i = at[lane] as usize;
+            let pair = |row: &[u8]| u32::from(u16::from_le_bytes([row[i], row[i + 1]]));
+            near[lane] = pair(r0) | pair(r1) << 16;
+            far[lane] = pair(r2) | pair(r3) << 16;
+        }
+        let [a, b, c, d] = bytes(simd, u32x16::from_slice(simd, &near));
+        let [e, f, g, h] = bytes(simd, u32x16::from_slice(simd, &far));
+        [a, b, c, d, e, f, g, h]
+    }
+}
+
+impl Texel for u16 {
+    const CAN_BE_BLANK: bool = false;
+
+    #[inline(always)]
+    fn to_f32(self) -> f32 {
+        f32::from(self)
+    }
+
+    #[inline(always)]
+    fn is_blank(self) -> bool {
+        false
+    }
+
+    fn empty_range() -> [Self; 2] {
+        [u16::MAX, u16::MIN]
+    }
+
+    #[inline(always)]
+    fn corners<S: Simd>(simd: S, rows: [&[u16]; 4], at: i32x16<S>) -> [f32x16<S>; 8] {
+        let [r0, r1, r2, r3] = rows;
+        let n = r0.len();
+        let (r1, r2, r3) = (&r1[..n], &r2[..n], &r3[..n]);
+        let at: [i32; 16] = at.into();
+        let mut pairs = [[0_u32; 16]; 4];
+        for lane in 0..16 {
+            let i = at[lane] as usize;
+            let pair = |row: &[u16]| u32::from(row[i]) | u32::from(row[i + 1]) << 16;
+            pairs[0][lane] = pair(r0);
+            pairs[1][lane] = pair(r1);
+            pairs[2][lane] = pair(r2);
+            pairs[3][lane] = pair(r3);
+        }
+        let [[a, b], [c, d], [e, f], [g, h]] =
+            pairs.map(|pair| halves(simd, u32x16::from_slice(simd, &pair)));
+        [a, b, c, d, e, f, g, h]
+    }
+}
+
+impl Texel for f32 {
+    const CAN_BE_BLANK: bool = true;
+
+    #[inline(always)]
+    fn to_f32(self) -> f32 {
+        self
+    }
+
+    #[inline(always)]
+    fn is_blank(self) -> bool {
+        !self.is_finite()
+    }
+
+    fn empty_range() -> [Self; 2] {
+        [f32::INFINITY, f32::NEG_INFINITY]
+    }
+
+    #[inline(always)]
+    fn corners<S: Simd>(simd: S, rows: [&[f32]; 4], at: i32x16<S>) -> [f32x16<S>; 8] {
+        let [r0, r1, r2, r3] = rows;
+        let n = r0.len();
+        let (r1, r2, r3) = (&r1[..n], &r2[..n], &r3[..n]);
+        let at: [i32; 16] = at.into();
+        let mut corners = [[0.0_f32; 16]; 8];
+        for lane in 0..16 {
+            let i = at[lane] as usize;
+            for (pair, row) in [r0, r1, r2, r3].into_iter().enumerate() {
+                corners[2 * pair][lane] = row[i];
+                corners[2 * pair + 1][lane] = row[i + 1];
+            }
+        }
+        corners.map(|corner| f32x16::from_slice(simd, &corner))
+    }
+}

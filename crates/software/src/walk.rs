@@ -1,0 +1,300 @@
+//! The way of a packet through one brick.
+//!
+//! Each lane goes from cell to cell of its own. Blocks without matter are leapt over first, until every lane
+//! that is still on its way stands in a block with matter; then all take one cell. In a cell the field along
+//! the ray is the cubic of a trilinear interpolant: eight corners, fetched once, give its value anywhere.
+
+use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*};
+
+use crate::MIN_TRANSMITTANCE;
+use crate::brick::BLOCK_CELLS;
+use crate::math::opacity_of_depth;
+use crate::packet::Span;
+use crate::texel::Texel;
+
+/// Light gathered so far.
+pub(crate) struct Light<S: Simd> {
+    pub(crate) color: [f32x16<S>; 3],
+    pub(crate) transmittance: f32x16<S>,
+}
+
+/// A brick with all that a packet needs of it.
+pub(crate) struct Matter<'a, T> {
+    /// Samples along x, y, z, each at least 2.
+    pub(crate) samples: [u32; 3],
+    pub(crate) texels: &'a [T],
+    /// Blocks along x, y, z.
+    pub(crate) blocks: [u32; 3],
+    /// 1 for a block that may hold matter.
+    pub(crate) marks: &'a [u8],
+}
+
+/// Classification: texel to bin to integrals.
+#[derive(Clone, Copy)]
+pub(crate) struct Table<'a> {
+    pub(crate) entries: &'a [[f32; 4]],
+    /// `bin = scale * texel + offset`.
+    pub(crate) bin_from_texel: [f32; 2],
+}
+
+/// The integrals at one end of a piece.
+#[derive(Clone, Copy)]
+struct End<S: Simd> {
+    bin: i32x16<S>,
+    /// `[∫ r s, ∫ g s, ∫ b s, ∫ s]`.
+    integrals: [f32x16<S>; 4],
+}
+
+impl Table<'_> {
+    /// The bin of a texel value, which may stray from the range by rounding.
+    #[inline(always)]
+    fn bin<S: Simd>(&self, simd: S, texel: f32x16<S>) -> i32x16<S> {
+        let [scale, offset] = self.bin_from_texel;
+        let bin = texel.mul_add(f32x16::splat(simd, scale), f32x16::splat(simd, offset));
+        let last = (self.entries.len() - 2) as f32;
+        let bin = bin.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, last));
+        (bin + 0.5).to_int()
+    }
+
+    /// The end of a piece at a texel value, in another bin than `from`.
+    #[inline(always)]
+    fn end<S: Simd>(&self, simd: S, texel: f32x16<S>, from: i32x16<S>) -> End<S> {
+        let bin = self.bin(simd, texel);
+        // Two ends in one bin count as one whole bin: 2k goes with 2k + 1.
+        let bin = bin.simd_eq(from).select(bin ^ 1, bin);
+        self.at(simd, bin)
+    }
+
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, bin: i32x16<S>) -> End<S> {
+        let mut rows = [0.0_f32; 64];
+        let bins: [i32; 16] = bin.into();
+        for (lane, &bin) in bins.iter().enumerate() {
+            rows[4 * lane..4 * lane + 4].copy_from_slice(&self.entries[bin as usize]);
+        }
+        End { bin, integrals: transpose(simd, &rows) }
+    }
+}
+
+/// Four columns of sixteen rows.
+#[inline(always)]
+fn transpose<S: Simd>(simd: S, rows: &[f32; 64]) -> [f32x16<S>; 4] {
+    let quarter = |i: usize| f32x16::from_slice(simd, &rows[16 * i..16 * i + 16]);
+    let (q0, q1, q2, q3) = (quarter(0), quarter(1), quarter(2), quarter(3));
+    let (even01, odd01) = (q0.unzip_low(q1), q0.unzip_high(q1));
+    let (even23, odd23) = (q2.unzip_low(q3), q2.unzip_high(q3));
+    [even01.unzip_low(even23), odd01.unzip_low(odd23), even01.unzip_high(even23), odd01.unzip_high(odd23)]
+}
+
+impl<S: Simd> Light<S> {
+    #[inline(always)]
+    pub(crate) fn none(simd: S) -> Self {
+        Self { color: [f32x16::splat(simd, 0.0); 3], transmittance: f32x16::splat(simd, 1.0) }
+    }
+
+    /// Adds a piece of `length` between two ends.
+    #[inline(always)]
+    fn add(&mut self, simd: S, from: &End<S>, to: &End<S>, length: f32x16<S>) {
+        let zero = f32x16::splat(simd, 0.0);
+        let bins: f32x16<S> = (to.bin - from.bin).to_float();
+        let extinction = to.integrals[3] - from.integrals[3];
+        let alpha = opacity_of_depth(simd, length * extinction / bins);
+        let weight = extinction.simd_ne(zero).select(self.transmittance * alpha / extinction, zero);
+        for (color, (to, from)) in self.color.iter_mut().zip(to.integrals.iter().zip(&from.integrals)) {
+            *color = weight.mul_add(*to - *from, *color);
+        }
+        self.transmittance = self.transmittance - self.transmittance * alpha;
+    }
+}
+
+/// Where the lanes stand in the brick.
+struct Walker<'a, S: Simd> {
+    span: &'a Span<S>,
+    forward: [mask32x16<S>; 3],
+    /// Cells of the brick.
+    cells: [f32; 3],
+    /// The cell of each lane: whole numbers, exact in f32.
+    cell: [f32x16<S>; 3],
+    /// Unit lengths from the entry.
+    depth: f32x16<S>,
+    active: mask32x16<S>,
+}
+
+impl<'a, S: Simd> Walker<'a, S> {
+    #[inline(always)]
+    fn new(simd: S, span: &'a Span<S>, samples: [u32; 3]) -> Self {
+        let cells = samples.map(|n| (n - 1) as f32);
+        let zero = f32x16::splat(simd, 0.0);
+        let cell = [0, 1, 2]
+            .map(|axis| span.entry[axis].floor().max(zero).min(f32x16::splat(simd, cells[axis] - 1.0)));
+        let forward = span.direction.map(|d| d.simd_gt(zero));
+        Self { span, forward, cells, cell, depth: zero, active: span.active }
+    }
+
+    /// Depth of the plane `plane[axis]` along each axis.
+    #[inline(always)]
+    fn depth_of(&self, axis: usize, plane: f32x16<S>) -> f32x16<S> {
+        (plane - self.span.entry[axis]) * self.span.inverse[axis]
+    }
+
+    /// Lanes that stand in a block without matter.
+    #[inline(always)]
+    fn in_empty_block<T>(&self, simd: S, matter: &Matter<'_, T>) -> mask32x16<S> {
+        let block = self.cell.map(|c| (c * (1.0 / BLOCK_CELLS as f32)).floor());
+        let [nx, ny, _] = matter.blocks.map(|n| n as f32);
+        let row = block[2].mul_add(f32x16::splat(simd, ny), block[1]);
+        let index: i32x16<S> = row.mul_add(f32x16::splat(simd, nx), block[0]).to_int();
+        let index: [i32; 16] = index.into();
+        let mut marks = [0_i32; 16];
+        for (mark, &i) in marks.iter_mut().zip(&index) {
+            *mark = i32::from(matter.marks[i as usize]);
+        }
+        i32x16::from_slice(simd, &marks).simd_eq(0) & self.active
+    }
+
+    /// Takes `lanes` to where they leave their block.
+    #[inline(always)]
+    fn leap(&mut self, simd: S, lanes: mask32x16<S>) {
+        let size = BLOCK_CELLS as f32;
+        let first = self.cell.map(|c| (c * (1.0 / size)).floor() * size);
+        let exit = [0, 1, 2].map(|axis| {
+            let plane = self.forward[axis].select(first[axis] + size, first[axis]);
+            self.depth_of(axis, plane.min(f32x16::splat(simd, self.cells[axis])))
+        });
+        let depth = exit[0].min(exit[1]).min(exit[2]).max(self.depth);
+        for axis in 0..3 {
+            let position = self.span.direction[axis].mul_add(depth, self.span.entry[axis]);
+            // Along the axis of exit the next cell is certain; along others, rounding must not leave the block.
+            let inside = position.floor().max(first[axis]).min(first[axis] + (size - 1.0));
+            let beyond = self.forward[axis].select(first[axis] + size, first[axis] - 1.0);
+            let next = exit[axis].simd_le(depth).select(beyond, inside);
+            self.cell[axis] = lanes.select(next, self.cell[axis]);
+        }
+        self.depth = lanes.select(depth, self.depth);
+        self.stop_outside(simd);
+    }
+
+    /// Takes every lane to the next cell, at `depth`, which the planes at `exit` lead to.
+    #[inline(always)]
+    fn step(&mut self, simd: S, exit: &[f32x16<S>; 3], depth: f32x16<S>) {
+        for (axis, exit) in exit.iter().enumerate() {
+            let next = self.cell[axis]
+                + self.forward[axis].select(f32x16::splat(simd, 1.0), f32x16::splat(simd, -1.0));
+            self.cell[axis] = exit.simd_le(depth).select(next, self.cell[axis]);
+        }
+        self.depth = depth;
+        self.stop_outside(simd);
+    }
+
+    /// Ends lanes that have left the brick, and keeps their cells inside for the sake of addresses.
+    #[inline(always)]
+    fn stop_outside(&mut self, simd: S) {
+        let zero = f32x16::splat(simd, 0.0);
+        let mut active = self.active & self.depth.simd_lt(self.span.length);
+        for axis in 0..3 {
+            let last = f32x16::splat(simd, self.cells[axis] - 1.0);
+            let cell = self.cell[axis];
+            active = active & cell.simd_ge(zero) & cell.simd_le(last);
+            self.cell[axis] = cell.max(zero).min(last);
+        }
+        self.active = active;
+    }
+
+    /// Position in the cell at `depth`, in [0, 1] along each axis.
+    #[inline(always)]
+    fn fraction(&self, simd: S, depth: f32x16<S>) -> [f32x16<S>; 3] {
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        [0, 1, 2].map(|axis| {
+            let position = self.span.direction[axis].mul_add(depth, self.span.entry[axis]);
+            (position - self.cell[axis]).max(zero).min(one)
+        })
+    }
+}
+
+/// A cell's field.
+struct Cell<S: Simd> {
+    /// At x = 0: the corners (y, z) = (0, 0), (1, 0), (0, 1), (1, 1).
+    low: [f32x16<S>; 4],
+    /// What x = 1 adds.
+    slope: [f32x16<S>; 4],
+}
+
+impl<S: Simd> Cell<S> {
+    #[inline(always)]
+    fn new(corners: [f32x16<S>; 8]) -> Self {
+        let low = [0, 2, 4, 6].map(|i| corners[i]);
+        let slope = [0, 2, 4, 6].map(|i| corners[i + 1] - corners[i]);
+        Self { low, slope }
+    }
+
+    #[inline(always)]
+    fn value(&self, [x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| self.slope[i].mul_add(x, self.low[i]));
+        let near = (b - a).mul_add(y, a);
+        let far = (d - c).mul_add(y, c);
+        (far - near).mul_add(z, near)
+    }
+}
+
+/// Adds the light of one brick to a packet.
+#[inline(always)]
+pub(crate) fn walk<S: Simd, T: Texel>(
+    simd: S,
+    span: &Span<S>,
+    matter: &Matter<'_, T>,
+    table: Table<'_>,
+    light: &mut Light<S>,
+) {
+    let [nx, ny, nz] = matter.samples.map(|n| n as usize);
+    let (row, slice) = (nx, nx * ny);
+    let reach = nz * slice - slice - row;
+    let rows = [0, row, slice, slice + row].map(|offset| &matter.texels[offset..offset + reach]);
+    let (row, slice) = (f32x16::splat(simd, row as f32), f32x16::splat(simd, slice as f32));
+    let zero = f32x16::splat(simd, 0.0);
+
+    let mut walker = Walker::new(simd, span, matter.samples);
+    // Lanes whose last piece ended elsewhere than where the next begins.
+    let mut fresh = walker.active;
+    let mut from = table.at(simd, i32x16::splat(simd, 0));
+    loop {
+        loop {
+            let empty = walker.in_empty_block(simd, matter);
+            if empty.all_false() {
+                break;
+            }
+            walker.leap(simd, empty);
+            fresh |= empty;
+        }
+        if walker.active.all_false() {
+            return;
+        }
+        let [x, y, z] = walker.cell;
+        let address: i32x16<S> = z.mul_add(slice, y.mul_add(row, x)).to_int();
+        let cell = Cell::new(T::corners(simd, rows, address));
+
+        let exit = [0, 1, 2].map(|axis| {
+            let plane = walker.forward[axis].select(walker.cell[axis] + 1.0, walker.cell[axis]);
+            walker.depth_of(axis, plane)
+        });
+        let end = exit[0].min(exit[1]).min(exit[2]).min(span.length).max(walker.depth);
+        let half = (end - walker.depth) * 0.5;
+        if fresh.any_true() {
+            let value = cell.value(walker.fraction(simd, walker.depth));
+            from = table.at(simd, fresh.select(table.bin(simd, value), from.bin));
+        }
+        let middle = cell.value(walker.fraction(simd, walker.depth + half));
+        let last = cell.value(walker.fraction(simd, end));
+        // A blank corner makes every value of its cell NaN or infinite.
+        let blank = if T::CAN_BE_BLANK { (middle - middle).simd_ne(zero) } else { mask32x16::splat(simd, false) };
+        let length = (walker.active & !blank).select(half, zero);
+        let middle = table.end(simd, middle, from.bin);
+        light.add(simd, &from, &middle, length);
+        let last = table.end(simd, last, middle.bin);
+        light.add(simd, &middle, &last, length);
+        from = last;
+        fresh = blank;
+
+        walker.step(simd, &exit, end);
+        walker.active &= light.transmittance.simd_gt(MIN_TRANSMITTANCE);
+    }
+}
