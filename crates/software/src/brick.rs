@@ -4,8 +4,16 @@ use volery_frame::{Brick, IntegratedTransfer, UploadError, VolumeLayout};
 
 use crate::texel::Texel;
 
-/// Cells of a block per axis. A smaller block fits matter closer, a larger one is leapt over faster.
-pub(crate) const BLOCK_CELLS: u32 = 4;
+/// Blocks of a brick per axis, at most: one bit each fills a SIMD register of 512 bits.
+const BLOCKS: u32 = 8;
+
+/// Which blocks of a brick may hold matter: bit `x` of byte `y + 8 z`.
+pub(crate) type Occupancy = [u8; 64];
+
+/// Cells of a block per axis, for bricks of `brick_cells`: a power of two.
+pub(crate) const fn block_cells(brick_cells: u32) -> u32 {
+    brick_cells.div_ceil(BLOCKS).next_power_of_two()
+}
 
 /// The samples of one octree node.
 #[derive(Debug)]
@@ -14,7 +22,7 @@ pub(crate) struct StoredBrick<T> {
     pub(crate) samples: [u32; 3],
     pub(crate) texels: Box<[T]>,
     /// Blocks along x, y, z.
-    pub(crate) blocks: [u32; 3],
+    blocks: [u32; 3],
     /// Smallest and largest texel that is not blank, per block, x fastest; reversed when all are blank.
     ranges: Box<[[T; 2]]>,
 }
@@ -38,14 +46,14 @@ pub(crate) fn check(brick: &Brick<'_>, layout: &VolumeLayout) -> Result<(), Uplo
 }
 
 impl<T: Texel> StoredBrick<T> {
-    /// `texels` are as many as `samples` say.
-    pub(crate) fn new(samples: [u32; 3], texels: &[T]) -> Self {
-        let blocks = samples.map(|n| (n - 1).div_ceil(BLOCK_CELLS));
+    /// `texels` are as many as `samples` say; blocks have `block` cells per axis.
+    pub(crate) fn new(samples: [u32; 3], texels: &[T], block: u32) -> Self {
+        let blocks = samples.map(|n| (n - 1).div_ceil(block));
         let mut ranges = Vec::with_capacity(blocks.iter().product::<u32>() as usize);
         for z in 0..blocks[2] {
             for y in 0..blocks[1] {
                 for x in 0..blocks[0] {
-                    ranges.push(range(samples, texels, [x, y, z].map(|block| block * BLOCK_CELLS)));
+                    ranges.push(range(samples, texels, [x, y, z].map(|i| i * block), block));
                 }
             }
         }
@@ -57,29 +65,30 @@ impl<T: Texel> StoredBrick<T> {
         (size_of::<Self>() + size_of_val::<[T]>(texels) + size_of_val::<[[T; 2]]>(ranges)) as u64
     }
 
-    /// Marks each block that may hold matter with 1, others with 0; false when there is none at all.
+    /// Marks the blocks that may hold matter; `None` when there is none.
     pub(crate) fn occupancy(
         &self,
         transfer: &IntegratedTransfer,
         bin_from_texel: [f32; 2],
-        marks: &mut Vec<u8>,
-    ) -> bool {
+    ) -> Option<Occupancy> {
         let [scale, offset] = bin_from_texel;
-        // Bins are rounded to nearest when a ray is classified, hence the half bin on either side.
-        let mark = |[low, high]: &[T; 2]| {
+        let mut occupancy = [0; 64];
+        let [nx, ny, _] = self.blocks;
+        for (i, [low, high]) in (0_u32..).zip(&self.ranges) {
             let (low, high) = (low.to_f32() * scale + offset, high.to_f32() * scale + offset);
-            u8::from(!transfer.is_transparent(low - 0.5, high + 0.5) && low <= high)
-        };
-        marks.clear();
-        marks.extend(self.ranges.iter().map(mark));
-        marks.contains(&1)
+            // Bins are rounded to nearest when a ray is classified, hence the half bin on either side.
+            if low <= high && !transfer.is_transparent(low - 0.5, high + 0.5) {
+                let [x, y, z] = [i % nx, i / nx % ny, i / nx / ny];
+                occupancy[(y + BLOCKS * z) as usize] |= 1 << x;
+            }
+        }
+        (occupancy != [0; 64]).then_some(occupancy)
     }
 }
 
 /// Smallest and largest texel of a block, its upper faces included.
-fn range<T: Texel>(samples: [u32; 3], texels: &[T], first: [u32; 3]) -> [T; 2] {
-    let end: [usize; 3] =
-        std::array::from_fn(|axis| (first[axis] + BLOCK_CELLS + 1).min(samples[axis]) as usize);
+fn range<T: Texel>(samples: [u32; 3], texels: &[T], first: [u32; 3], block: u32) -> [T; 2] {
+    let end: [usize; 3] = std::array::from_fn(|axis| (first[axis] + block + 1).min(samples[axis]) as usize);
     let first = first.map(|x| x as usize);
     let [nx, ny, _] = samples.map(|n| n as usize);
     let mut range: Option<[T; 2]> = None;

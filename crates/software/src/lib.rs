@@ -12,8 +12,8 @@
 //! and exit from one fetch of eight corners, and the two halves are integrated through the
 //! [`IntegratedTransfer`](volery_frame::IntegratedTransfer).
 //!
-//! Empty space costs little: a brick keeps the range of every block of 4x4x4 cells, a frame marks the blocks
-//! that are transparent under its transfer function, and lanes leap over those.
+//! Empty space costs little: a brick keeps the range of each of its blocks, 8x8x8 of them; a frame marks those
+//! that may hold matter under its transfer function, 512 bits in one SIMD register; lanes leap over the others.
 //!
 //! # Error
 //! A half cell is integrated as if the field were linear over it: of second order in the size of a cell, and
@@ -100,7 +100,7 @@ impl Backend for SoftwareBackend {
         let Some(first) = bricks.first() else { return Ok(()) };
         let (layout, pool) = self.volume.as_mut().ok_or(UploadError::NoVolume { id: first.id })?;
         bricks.iter().try_for_each(|brick| brick::check(brick, layout))?;
-        pool.insert(bricks);
+        pool.insert(bricks, brick::block_cells(layout.brick_cells));
         Ok(())
     }
 
@@ -139,17 +139,17 @@ impl Pool {
     }
 
     /// All bricks have been checked against the layout.
-    fn insert(&mut self, new: &[Brick<'_>]) {
+    fn insert(&mut self, new: &[Brick<'_>], block: u32) {
         for brick in new {
             match (&mut *self, brick.texels) {
                 (Self::U8(bricks), Texels::U8(texels)) => {
-                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels));
+                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels, block));
                 }
                 (Self::U16(bricks), Texels::U16(texels)) => {
-                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels));
+                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels, block));
                 }
                 (Self::F32(bricks), Texels::F32(texels)) => {
-                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels));
+                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels, block));
                 }
                 _ => unreachable!("the type was checked against the layout"),
             }

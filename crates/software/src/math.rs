@@ -1,6 +1,18 @@
-//! The exponential of a packet.
+//! The exponential of a packet, and loops that are inlined for certain.
 
 use fearless_simd::{f32x16, i32x16, prelude::*};
+
+/// `f` of 0, 1, 2. `array::map` is not inlined for certain, and SIMD code that is not inlined goes through memory.
+#[inline(always)]
+pub(crate) fn axes<T>(f: impl Fn(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
+}
+
+/// `f` of 0, 1, 2, 3; see [`axes`].
+#[inline(always)]
+pub(crate) fn four<T>(f: impl Fn(usize) -> T) -> [T; 4] {
+    [f(0), f(1), f(2), f(3)]
+}
 
 /// `1 - exp(-depth)` for `depth >= 0`, without loss of digits near zero; relative error below 3e-7.
 ///
@@ -13,8 +25,7 @@ pub(crate) fn opacity_of_depth<S: Simd>(simd: S, depth: f32x16<S>) -> f32x16<S> 
     let r = y - n;
     // 2^r - 1 on [-1/2, 1/2]: the Taylor series in r ln 2.
     let mut p = f32x16::splat(simd, 1.525_273_4e-5);
-    for c in
-        [1.540_353e-4, 1.333_355_8e-3, 9.618_129e-3, 5.550_411e-2, 2.402_265e-1, std::f32::consts::LN_2]
+    for c in [1.540_353e-4, 1.333_355_8e-3, 9.618_129e-3, 5.550_411e-2, 2.402_265e-1, std::f32::consts::LN_2]
     {
         p = p.mul_add(r, f32x16::splat(simd, c));
     }

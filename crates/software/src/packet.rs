@@ -4,6 +4,8 @@ use fearless_simd::{f32x16, f64x8, mask32x16, prelude::*};
 use glam::DVec3;
 use volery_scene::RayGrid;
 
+use crate::math::axes;
+
 /// Pixels of a packet per axis; a lane is `column + 4 * row`.
 pub(crate) const PACKET: u32 = 4;
 
@@ -83,36 +85,55 @@ impl<S: Simd> Packet<S> {
         level: u32,
         wanted: mask32x16<S>,
     ) -> Option<Span<S>> {
-        let mut near = [f64x8::splat(simd, 0.0); 2];
-        let mut far = [f64x8::splat(simd, f64::INFINITY); 2];
-        for axis in 0..3 {
-            for half in 0..2 {
-                let (o, inverse) = (self.origin[axis][half], self.inverse[axis][half]);
-                let (a, b) = ((low[axis] - o) * inverse, (high[axis] - o) * inverse);
-                near[half] = near[half].max(a.min(b));
-                far[half] = far[half].min(a.max(b));
-            }
-        }
-        let length: f32x16<S> = simd.narrow_f64x8(far[0] - near[0], far[1] - near[1]);
+        let (near0, far0) = self.depths(simd, 0, low, high);
+        let (near1, far1) = self.depths(simd, 1, low, high);
+        let near = [near0, near1];
+        let length: f32x16<S> = simd.narrow_f64x8(far0 - near0, far1 - near1);
         let active = length.simd_gt(0.0) & wanted;
         if active.all_false() {
             return None;
         }
         let scale = 0.5_f64.powi(level as i32);
-        let entry = [0, 1, 2].map(|axis| {
-            let [a, b] = [0, 1].map(|half| {
-                let o = self.origin[axis][half] - low[axis];
-                (self.direction[axis][half].mul_add(near[half], o)) * scale
-            });
-            simd.narrow_f64x8(a, b)
-        });
+        let entry = axes(
+            #[inline(always)]
+            |axis| {
+                let first = self.position(axis, 0, near[0], low[axis]) * scale;
+                simd.narrow_f64x8(first, self.position(axis, 1, near[1], low[axis]) * scale)
+            },
+        );
         let (shrink, grow) = (scale as f32, (1_u64 << level) as f32);
         Some(Span {
             entry,
-            direction: self.narrow_direction.map(|d| d * shrink),
-            inverse: self.narrow_inverse.map(|i| i * grow),
+            direction: axes(
+                #[inline(always)]
+                |axis| self.narrow_direction[axis] * shrink,
+            ),
+            inverse: axes(
+                #[inline(always)]
+                |axis| self.narrow_inverse[axis] * grow,
+            ),
             length,
             active,
         })
+    }
+
+    /// Where half of the lanes enter and leave a box; they miss it if they enter behind where they leave.
+    #[inline(always)]
+    fn depths(&self, simd: S, half: usize, low: [f64; 3], high: [f64; 3]) -> (f64x8<S>, f64x8<S>) {
+        let [x, y, z] = axes(
+            #[inline(always)]
+            |axis| {
+                let (o, inverse) = (self.origin[axis][half], self.inverse[axis][half]);
+                let (a, b) = ((low[axis] - o) * inverse, (high[axis] - o) * inverse);
+                (a.min(b), a.max(b))
+            },
+        );
+        (x.0.max(y.0).max(z.0).max(f64x8::splat(simd, 0.0)), x.1.min(y.1).min(z.1))
+    }
+
+    /// Finest cells from the plane at `low` to half of the rays at `depth`.
+    #[inline(always)]
+    fn position(&self, axis: usize, half: usize, depth: f64x8<S>, low: f64) -> f64x8<S> {
+        self.direction[axis][half].mul_add(depth, self.origin[axis][half] - low)
     }
 }

@@ -6,6 +6,7 @@ use fearless_simd::{f32x16, i32x16, prelude::*, u32x16};
 use volery_frame::BrickId;
 
 use crate::brick::StoredBrick;
+use crate::math::four;
 
 /// Resident bricks, all of one type.
 #[derive(Debug)]
@@ -37,14 +38,19 @@ pub(crate) trait Texel: Copy + Default + PartialOrd + Send + Sync + std::fmt::De
 #[inline(always)]
 fn bytes<S: Simd>(simd: S, packed: u32x16<S>) -> [f32x16<S>; 4] {
     let mask = u32x16::splat(simd, 0xff);
-    [packed & mask, (packed >> 8) & mask, (packed >> 16) & mask, packed >> 24].map(|byte| byte.to_float())
+    [
+        (packed & mask).to_float(),
+        ((packed >> 8) & mask).to_float(),
+        ((packed >> 16) & mask).to_float(),
+        (packed >> 24).to_float(),
+    ]
 }
 
 /// The two halves of each lane as floats.
 #[inline(always)]
 fn halves<S: Simd>(simd: S, packed: u32x16<S>) -> [f32x16<S>; 2] {
     let mask = u32x16::splat(simd, 0xffff);
-    [packed & mask, packed >> 16].map(|half| half.to_float())
+    [(packed & mask).to_float(), (packed >> 16).to_float()]
 }
 
 impl Texel for u8 {
@@ -116,8 +122,10 @@ impl Texel for u16 {
             pairs[2][lane] = pair(r2);
             pairs[3][lane] = pair(r3);
         }
-        let [[a, b], [c, d], [e, f], [g, h]] =
-            pairs.map(|pair| halves(simd, u32x16::from_slice(simd, &pair)));
+        let [[a, b], [c, d], [e, f], [g, h]] = four(
+            #[inline(always)]
+            |i| halves(simd, u32x16::from_slice(simd, &pairs[i])),
+        );
         [a, b, c, d, e, f, g, h]
     }
 }
@@ -153,6 +161,13 @@ impl Texel for f32 {
                 corners[2 * pair + 1][lane] = row[i + 1];
             }
         }
-        corners.map(|corner| f32x16::from_slice(simd, &corner))
+        let [[a, b], [c, d], [e, f], [g, h]] = four(
+            #[inline(always)]
+            |i| {
+                let [even, odd] = [&corners[2 * i], &corners[2 * i + 1]];
+                [f32x16::from_slice(simd, even), f32x16::from_slice(simd, odd)]
+            },
+        );
+        [a, b, c, d, e, f, g, h]
     }
 }

@@ -9,7 +9,7 @@ use volery_frame::{BrickId, DrawError, Frame, PlacedBrick, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use crate::MIN_TRANSMITTANCE;
-use crate::brick::StoredBrick;
+use crate::brick::{Occupancy, StoredBrick, block_cells};
 use crate::packet::{PACKET, Packet};
 use crate::texel::Texel;
 use crate::walk::{Light, Matter, Table, walk};
@@ -20,7 +20,7 @@ const TILE: u32 = 32;
 /// A brick of this frame that holds matter.
 struct Drawable<'a, T> {
     brick: &'a StoredBrick<T>,
-    marks: Vec<u8>,
+    occupancy: Occupancy,
     level: u32,
     /// Lower and upper corner in finest cells.
     bounds: [[f64; 3]; 2],
@@ -89,15 +89,8 @@ fn drawable<'a, T: Texel>(
 ) -> Option<Drawable<'a, T>> {
     let bounds = placed.bounds(layout).map(|corner| corner.map(f64::from));
     let tiles = projector.tiles(bounds)?;
-    let mut marks = Vec::new();
-    let holds_matter = brick.occupancy(frame.transfer, bin_from_texel, &mut marks);
-    (holds_matter && brick.samples.iter().all(|&n| n > 1)).then_some(Drawable {
-        brick,
-        marks,
-        level: placed.level,
-        bounds,
-        tiles,
-    })
+    let occupancy = brick.occupancy(frame.transfer, bin_from_texel)?;
+    Some(Drawable { brick, occupancy, level: placed.level, bounds, tiles })
 }
 
 /// Finds the tiles that a box can touch.
@@ -215,8 +208,8 @@ fn draw_packet<S: Simd, T: Texel>(
         let matter = Matter {
             samples: drawable.brick.samples,
             texels: &drawable.brick.texels,
-            blocks: drawable.brick.blocks,
-            marks: &drawable.marks,
+            occupancy: &drawable.occupancy,
+            block: block_cells(shared.layout.brick_cells),
         };
         simd.vectorize(
             #[inline(always)]

@@ -4,11 +4,11 @@
 //! that is still on its way stands in a block with matter; then all take one cell. In a cell the field along
 //! the ray is the cubic of a trilinear interpolant: eight corners, fetched once, give its value anywhere.
 
-use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*};
+use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
 use crate::MIN_TRANSMITTANCE;
-use crate::brick::BLOCK_CELLS;
-use crate::math::opacity_of_depth;
+use crate::brick::Occupancy;
+use crate::math::{axes, four, opacity_of_depth};
 use crate::packet::Span;
 use crate::texel::Texel;
 
@@ -23,10 +23,9 @@ pub(crate) struct Matter<'a, T> {
     /// Samples along x, y, z, each at least 2.
     pub(crate) samples: [u32; 3],
     pub(crate) texels: &'a [T],
-    /// Blocks along x, y, z.
-    pub(crate) blocks: [u32; 3],
-    /// 1 for a block that may hold matter.
-    pub(crate) marks: &'a [u8],
+    pub(crate) occupancy: &'a Occupancy,
+    /// Cells of a block per axis.
+    pub(crate) block: u32,
 }
 
 /// Classification: texel to bin to integrals.
@@ -79,8 +78,10 @@ impl Table<'_> {
 /// Four columns of sixteen rows.
 #[inline(always)]
 fn transpose<S: Simd>(simd: S, rows: &[f32; 64]) -> [f32x16<S>; 4] {
-    let quarter = |i: usize| f32x16::from_slice(simd, &rows[16 * i..16 * i + 16]);
-    let (q0, q1, q2, q3) = (quarter(0), quarter(1), quarter(2), quarter(3));
+    let [q0, q1, q2, q3] = four(
+        #[inline(always)]
+        |i| f32x16::from_slice(simd, &rows[16 * i..16 * i + 16]),
+    );
     let (even01, odd01) = (q0.unzip_low(q1), q0.unzip_high(q1));
     let (even23, odd23) = (q2.unzip_low(q3), q2.unzip_high(q3));
     [even01.unzip_low(even23), odd01.unzip_low(odd23), even01.unzip_high(even23), odd01.unzip_high(odd23)]
@@ -100,9 +101,10 @@ impl<S: Simd> Light<S> {
         let extinction = to.integrals[3] - from.integrals[3];
         let alpha = opacity_of_depth(simd, length * extinction / bins);
         let weight = extinction.simd_ne(zero).select(self.transmittance * alpha / extinction, zero);
-        for (color, (to, from)) in self.color.iter_mut().zip(to.integrals.iter().zip(&from.integrals)) {
-            *color = weight.mul_add(*to - *from, *color);
-        }
+        self.color = axes(
+            #[inline(always)]
+            |i| weight.mul_add(to.integrals[i] - from.integrals[i], self.color[i]),
+        );
         self.transmittance = self.transmittance - self.transmittance * alpha;
     }
 }
@@ -113,6 +115,8 @@ struct Walker<'a, S: Simd> {
     forward: [mask32x16<S>; 3],
     /// Cells of the brick.
     cells: [f32; 3],
+    /// Cells of a block per axis.
+    block: f32,
     /// The cell of each lane: whole numbers, exact in f32.
     cell: [f32x16<S>; 3],
     /// Unit lengths from the entry.
@@ -122,13 +126,16 @@ struct Walker<'a, S: Simd> {
 
 impl<'a, S: Simd> Walker<'a, S> {
     #[inline(always)]
-    fn new(simd: S, span: &'a Span<S>, samples: [u32; 3]) -> Self {
-        let cells = samples.map(|n| (n - 1) as f32);
+    fn new<T>(simd: S, span: &'a Span<S>, matter: &Matter<'_, T>) -> Self {
+        let cells = matter.samples.map(|n| (n - 1) as f32);
         let zero = f32x16::splat(simd, 0.0);
         let cell = [0, 1, 2]
             .map(|axis| span.entry[axis].floor().max(zero).min(f32x16::splat(simd, cells[axis] - 1.0)));
-        let forward = span.direction.map(|d| d.simd_gt(zero));
-        Self { span, forward, cells, cell, depth: zero, active: span.active }
+        let forward = axes(
+            #[inline(always)]
+            |axis| span.direction[axis].simd_gt(zero),
+        );
+        Self { span, forward, cells, block: matter.block as f32, cell, depth: zero, active: span.active }
     }
 
     /// Depth of the plane `plane[axis]` along each axis.
@@ -139,28 +146,32 @@ impl<'a, S: Simd> Walker<'a, S> {
 
     /// Lanes that stand in a block without matter.
     #[inline(always)]
-    fn in_empty_block<T>(&self, simd: S, matter: &Matter<'_, T>) -> mask32x16<S> {
-        let block = self.cell.map(|c| (c * (1.0 / BLOCK_CELLS as f32)).floor());
-        let [nx, ny, _] = matter.blocks.map(|n| n as f32);
-        let row = block[2].mul_add(f32x16::splat(simd, ny), block[1]);
-        let index: i32x16<S> = row.mul_add(f32x16::splat(simd, nx), block[0]).to_int();
-        let index: [i32; 16] = index.into();
-        let mut marks = [0_i32; 16];
-        for (mark, &i) in marks.iter_mut().zip(&index) {
-            *mark = i32::from(matter.marks[i as usize]);
-        }
-        i32x16::from_slice(simd, &marks).simd_eq(0) & self.active
+    fn in_empty_block(&self, simd: S, occupancy: u8x64<S>) -> mask32x16<S> {
+        let [x, y, z] = axes(
+            #[inline(always)]
+            |axis| (self.cell[axis] * (1.0 / self.block)).floor(),
+        );
+        let byte: u32x16<S> = z.mul_add(f32x16::splat(simd, 8.0), y).to_int();
+        let byte: u32x16<S> = simd.swizzle_dyn_u8x64(occupancy, byte.bitcast()).bitcast();
+        let bit: u32x16<S> = x.to_int();
+        ((byte >> bit) & 1).simd_eq(0) & self.active
     }
 
     /// Takes `lanes` to where they leave their block.
     #[inline(always)]
     fn leap(&mut self, simd: S, lanes: mask32x16<S>) {
-        let size = BLOCK_CELLS as f32;
-        let first = self.cell.map(|c| (c * (1.0 / size)).floor() * size);
-        let exit = [0, 1, 2].map(|axis| {
-            let plane = self.forward[axis].select(first[axis] + size, first[axis]);
-            self.depth_of(axis, plane.min(f32x16::splat(simd, self.cells[axis])))
-        });
+        let size = self.block;
+        let first = axes(
+            #[inline(always)]
+            |axis| (self.cell[axis] * (1.0 / size)).floor() * size,
+        );
+        let exit = axes(
+            #[inline(always)]
+            |axis| {
+                let plane = self.forward[axis].select(first[axis] + size, first[axis]);
+                self.depth_of(axis, plane.min(f32x16::splat(simd, self.cells[axis])))
+            },
+        );
         let depth = exit[0].min(exit[1]).min(exit[2]).max(self.depth);
         for axis in 0..3 {
             let position = self.span.direction[axis].mul_add(depth, self.span.entry[axis]);
@@ -204,10 +215,13 @@ impl<'a, S: Simd> Walker<'a, S> {
     #[inline(always)]
     fn fraction(&self, simd: S, depth: f32x16<S>) -> [f32x16<S>; 3] {
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        [0, 1, 2].map(|axis| {
-            let position = self.span.direction[axis].mul_add(depth, self.span.entry[axis]);
-            (position - self.cell[axis]).max(zero).min(one)
-        })
+        axes(
+            #[inline(always)]
+            |axis| {
+                let position = self.span.direction[axis].mul_add(depth, self.span.entry[axis]);
+                (position - self.cell[axis]).max(zero).min(one)
+            },
+        )
     }
 }
 
@@ -222,14 +236,23 @@ struct Cell<S: Simd> {
 impl<S: Simd> Cell<S> {
     #[inline(always)]
     fn new(corners: [f32x16<S>; 8]) -> Self {
-        let low = [0, 2, 4, 6].map(|i| corners[i]);
-        let slope = [0, 2, 4, 6].map(|i| corners[i + 1] - corners[i]);
+        let low = four(
+            #[inline(always)]
+            |i| corners[2 * i],
+        );
+        let slope = four(
+            #[inline(always)]
+            |i| corners[2 * i + 1] - corners[2 * i],
+        );
         Self { low, slope }
     }
 
     #[inline(always)]
     fn value(&self, [x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| self.slope[i].mul_add(x, self.low[i]));
+        let [a, b, c, d] = four(
+            #[inline(always)]
+            |i| self.slope[i].mul_add(x, self.low[i]),
+        );
         let near = (b - a).mul_add(y, a);
         let far = (d - c).mul_add(y, c);
         (far - near).mul_add(z, near)
@@ -252,13 +275,14 @@ pub(crate) fn walk<S: Simd, T: Texel>(
     let (row, slice) = (f32x16::splat(simd, row as f32), f32x16::splat(simd, slice as f32));
     let zero = f32x16::splat(simd, 0.0);
 
-    let mut walker = Walker::new(simd, span, matter.samples);
+    let occupancy = u8x64::from_slice(simd, matter.occupancy);
+    let mut walker = Walker::new(simd, span, matter);
     // Lanes whose last piece ended elsewhere than where the next begins.
     let mut fresh = walker.active;
     let mut from = table.at(simd, i32x16::splat(simd, 0));
     loop {
         loop {
-            let empty = walker.in_empty_block(simd, matter);
+            let empty = walker.in_empty_block(simd, occupancy);
             if empty.all_false() {
                 break;
             }
@@ -272,10 +296,13 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         let address: i32x16<S> = z.mul_add(slice, y.mul_add(row, x)).to_int();
         let cell = Cell::new(T::corners(simd, rows, address));
 
-        let exit = [0, 1, 2].map(|axis| {
-            let plane = walker.forward[axis].select(walker.cell[axis] + 1.0, walker.cell[axis]);
-            walker.depth_of(axis, plane)
-        });
+        let exit = axes(
+            #[inline(always)]
+            |axis| {
+                let plane = walker.forward[axis].select(walker.cell[axis] + 1.0, walker.cell[axis]);
+                walker.depth_of(axis, plane)
+            },
+        );
         let end = exit[0].min(exit[1]).min(exit[2]).min(span.length).max(walker.depth);
         let half = (end - walker.depth) * 0.5;
         if fresh.any_true() {
@@ -285,7 +312,7 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         let middle = cell.value(walker.fraction(simd, walker.depth + half));
         let last = cell.value(walker.fraction(simd, end));
         // A blank corner makes every value of its cell NaN or infinite.
-        let blank = if T::CAN_BE_BLANK { (middle - middle).simd_ne(zero) } else { mask32x16::splat(simd, false) };
+        let blank = if T::CAN_BE_BLANK { !middle.is_finite() } else { mask32x16::splat(simd, false) };
         let length = (walker.active & !blank).select(half, zero);
         let middle = table.end(simd, middle, from.bin);
         light.add(simd, &from, &middle, length);
