@@ -1,8 +1,8 @@
 //! A head as a CT scanner sees it: nested ellipsoids with soft edges.
 //!
 //! In the manner of Shepp and Logan's phantom ("The Fourier reconstruction of a head section", IEEE Trans.
-//! Nucl. Sci. 21, 1974), but ours: in three dimensions, in Hounsfield units, with a face, and with edges two
-//! hundredths of the head wide, since a scanner has a point spread and a picture without aliasing needs one.
+//! Nucl. Sci. 21, 1974), but ours: in three dimensions, in Hounsfield units, with a face, and with edges 1.5 %
+//! of the head wide, since a scanner has a point spread and a picture without aliasing needs one.
 //! Later ellipsoids cover earlier ones: `v <- v + w (material - v)`, `w` rising smoothly from 0 outside to 1
 //! inside.
 
@@ -52,8 +52,8 @@ const PARTS: [Ellipsoid; 28] = [
     part([0.0, -0.34, -0.62], [0.27, 0.32, 0.28], SKIN),
     part([0.0, -0.42, -0.44], [0.24, 0.26, 0.08], AIR),
     // Cheeks and skull, its marrow, the brain inside it.
-    part([0.42, -0.58, -0.22], [0.16, 0.16, 0.12], BONE),
-    part([-0.42, -0.58, -0.22], [0.16, 0.16, 0.12], BONE),
+    part([0.37, -0.57, -0.27], [0.14, 0.13, 0.09], BONE),
+    part([-0.37, -0.57, -0.27], [0.14, 0.13, 0.09], BONE),
     part([0.0, 0.02, 0.13], [0.66, 0.81, 0.74], BONE),
     part([0.0, 0.02, 0.13], [0.635, 0.785, 0.715], MARROW),
     part([0.0, 0.02, 0.13], [0.615, 0.765, 0.695], BONE),

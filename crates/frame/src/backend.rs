@@ -160,7 +160,7 @@ pub fn check_frame(frame: &Frame<'_>, layout: &VolumeLayout, max_size: u32) -> R
         let placed = size.is_some_and(|size| {
             (0..3).all(|axis| {
                 let first = brick.first_cell[axis];
-                first % size == 0 && first < layout.cells[axis] && first.checked_add(size).is_some()
+                first % size == 0 && first < layout.cells[axis].max(1) && first.checked_add(size).is_some()
             })
         });
         if !placed {

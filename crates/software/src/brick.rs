@@ -75,9 +75,10 @@ impl<T: Texel> StoredBrick<T> {
         let mut occupancy = [0; 64];
         let [nx, ny, _] = self.blocks;
         for (i, [low, high]) in (0_u32..).zip(&self.ranges) {
-            let (low, high) = (low.to_f32() * scale + offset, high.to_f32() * scale + offset);
+            // A negative scale turns the range around.
+            let (a, b) = (low.to_f32() * scale + offset, high.to_f32() * scale + offset);
             // Bins are rounded to nearest when a ray is classified, hence the half bin on either side.
-            if low <= high && !transfer.is_transparent(low - 0.5, high + 0.5) {
+            if low <= high && !transfer.is_transparent(a.min(b) - 0.5, a.max(b) + 0.5) {
                 let [x, y, z] = [i % nx, i / nx % ny, i / nx / ny];
                 occupancy[(y + BLOCKS * z) as usize] |= 1 << x;
             }
@@ -91,19 +92,14 @@ fn range<T: Texel>(samples: [u32; 3], texels: &[T], first: [u32; 3], block: u32)
     let end: [usize; 3] = std::array::from_fn(|axis| (first[axis] + block + 1).min(samples[axis]) as usize);
     let first = first.map(|x| x as usize);
     let [nx, ny, _] = samples.map(|n| n as usize);
-    let mut range: Option<[T; 2]> = None;
+    let mut range = T::EMPTY_RANGE;
     for z in first[2]..end[2] {
         for y in first[1]..end[1] {
             let row = (z * ny + y) * nx;
             for &texel in &texels[row + first[0]..row + end[0]] {
-                if !texel.is_blank() {
-                    let [low, high] = range.unwrap_or([texel, texel]);
-                    let low = if texel < low { texel } else { low };
-                    let high = if texel > high { texel } else { high };
-                    range = Some([low, high]);
-                }
+                range = T::include(range, texel);
             }
         }
     }
-    range.unwrap_or_else(T::empty_range)
+    range
 }

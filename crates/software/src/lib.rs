@@ -27,21 +27,18 @@
 mod brick;
 mod math;
 mod packet;
+mod pool;
 mod texel;
 mod tile;
 mod walk;
 
-use std::collections::HashMap;
-
 use fearless_simd::Level;
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Device, DeviceKind, DrawError, Drawn, Frame, Image, Texels, UploadError,
-    VolumeLayout,
+    Backend, Brick, BrickId, Device, DeviceKind, DrawError, Drawn, Frame, Image, UploadError, VolumeLayout,
 };
 
-use crate::brick::StoredBrick;
-use crate::texel::Pool;
+use crate::pool::{Pool, for_bricks};
 
 /// A ray ends when its transmittance falls below this.
 pub const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
@@ -111,60 +108,9 @@ impl Backend for SoftwareBackend {
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
         let (layout, pool) = self.volume.as_ref().ok_or(DrawError::NoVolume)?;
         check_frame(frame, layout, MAX_SIZE)?;
-        let pixels = match pool {
-            Pool::U8(bricks) => tile::draw(self.level, frame, layout, bricks),
-            Pool::U16(bricks) => tile::draw(self.level, frame, layout, bricks),
-            Pool::F32(bricks) => tile::draw(self.level, frame, layout, bricks),
-        }?;
+        let pixels = for_bricks!(pool, |bricks| tile::draw(self.level, frame, layout, bricks))?;
         let image = Image { width: frame.width, height: frame.height, pixels };
         Ok(Drawn { image, device_seconds: None })
-    }
-}
-
-impl Pool {
-    fn new(texel: volery_frame::TexelType) -> Self {
-        match texel {
-            volery_frame::TexelType::U8 => Self::U8(HashMap::new()),
-            volery_frame::TexelType::U16 => Self::U16(HashMap::new()),
-            volery_frame::TexelType::F32 => Self::F32(HashMap::new()),
-        }
-    }
-
-    fn contains(&self, id: BrickId) -> bool {
-        match self {
-            Self::U8(bricks) => bricks.contains_key(&id),
-            Self::U16(bricks) => bricks.contains_key(&id),
-            Self::F32(bricks) => bricks.contains_key(&id),
-        }
-    }
-
-    /// All bricks have been checked against the layout.
-    fn insert(&mut self, new: &[Brick<'_>], block: u32) {
-        for brick in new {
-            match (&mut *self, brick.texels) {
-                (Self::U8(bricks), Texels::U8(texels)) => {
-                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels, block));
-                }
-                (Self::U16(bricks), Texels::U16(texels)) => {
-                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels, block));
-                }
-                (Self::F32(bricks), Texels::F32(texels)) => {
-                    bricks.insert(brick.id, StoredBrick::new(brick.samples, texels, block));
-                }
-                _ => unreachable!("the type was checked against the layout"),
-            }
-        }
-    }
-
-    fn bytes(&self) -> u64 {
-        fn sum<T: texel::Texel>(bricks: &HashMap<BrickId, StoredBrick<T>>) -> u64 {
-            bricks.values().map(StoredBrick::bytes).sum()
-        }
-        match self {
-            Self::U8(bricks) => sum(bricks),
-            Self::U16(bricks) => sum(bricks),
-            Self::F32(bricks) => sum(bricks),
-        }
     }
 }
 

@@ -36,6 +36,15 @@ pub(crate) fn opacity_of_depth<S: Simd>(simd: S, depth: f32x16<S>) -> f32x16<S> 
     (1.0 - scale) - scale * p
 }
 
+/// How far the light of a piece of ray is from that of its mean colour, as a share of the change of colour
+/// along it: `1/2 - 1/depth + 1/(exp(depth) - 1)`, the distance from the middle of the piece to the centre of
+/// what is seen of it. Within 0.002 up to a depth of 3; beyond, where a piece is opaque, too small by up to 0.2.
+#[inline(always)]
+pub(crate) fn front_weight<S: Simd>(simd: S, depth: f32x16<S>) -> f32x16<S> {
+    let depth = depth.min(f32x16::splat(simd, 8.0));
+    depth / (depth * depth).mul_add(f32x16::splat(simd, 0.2), f32x16::splat(simd, 12.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,5 +70,20 @@ mod tests {
         let zero: [f32; 16] =
             dispatch!(Level::new(), simd => opacity_of_depth(simd, f32x16::splat(simd, 0.0)).into());
         assert_eq!(zero, [0.0; 16]);
+    }
+
+    #[test]
+    fn front_weight_is_the_centre_of_what_is_seen() {
+        let mut worst = 0.0_f64;
+        for i in 1..=300 {
+            let depth = f64::from(i) / 100.0;
+            let exact = 0.5 - 1.0 / depth + 1.0 / depth.exp_m1();
+            let found: [f32; 16] = dispatch!(Level::new(), simd => {
+                front_weight(simd, f32x16::splat(simd, depth as f32)).into()
+            });
+            worst = worst.max((f64::from(found[0]) - exact).abs());
+        }
+        println!("error {worst:.2e}, threshold 2e-3");
+        assert!(worst < 2e-3);
     }
 }

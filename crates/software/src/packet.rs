@@ -17,7 +17,7 @@ pub(crate) struct Packet<S: Simd> {
     origin: [Wide<S>; 3],
     direction: [Wide<S>; 3],
     inverse: [Wide<S>; 3],
-    /// `direction` and `inverse` in f32, the latter finite.
+    /// `direction` and `inverse` in f32, both finite and neither zero.
     narrow_direction: [f32x16<S>; 3],
     narrow_inverse: [f32x16<S>; 3],
 }
@@ -56,14 +56,12 @@ impl<S: Simd> Packet<S> {
             let d = ray.direction * unit_length / spacing;
             for axis in 0..3 {
                 origin[axis][lane as usize] = o[axis];
-                // A ray that stands still along an axis creeps forward, so that 1 / d exists: by 1e-290 of a
-                // cell over any distance that f32 can tell.
-                direction[axis][lane as usize] = if d[axis].abs() < 1e-290 { 1e-290 } else { d[axis] };
+                // A ray that stands still along an axis creeps forward, so that 1 / d exists, in f32 too.
+                direction[axis][lane as usize] = if d[axis].abs() < 1e-30 { 1e-30 } else { d[axis] };
             }
         }
         let wide = |values: &[f64; 16]| [0, 8].map(|half| f64x8::from_slice(simd, &values[half..half + 8]));
-        let narrow =
-            |values: &[f64; 16]| f32x16::from_slice(simd, &values.map(|x| (x as f32).clamp(-1e30, 1e30)));
+        let narrow = |values: &[f64; 16]| f32x16::from_slice(simd, &values.map(|x| x as f32));
         let inverse = direction.map(|d| d.map(f64::recip));
         Self {
             origin: [0, 1, 2].map(|axis| wide(&origin[axis])),

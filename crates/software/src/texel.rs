@@ -1,20 +1,9 @@
 //! Texel types, and how a packet fetches the eight corners of a cell.
 
-use std::collections::HashMap;
-
 use fearless_simd::{f32x16, i32x16, prelude::*, u32x16};
-use volery_frame::BrickId;
+use volery_frame::Texels;
 
-use crate::brick::StoredBrick;
 use crate::math::four;
-
-/// Resident bricks, all of one type.
-#[derive(Debug)]
-pub(crate) enum Pool {
-    U8(HashMap<BrickId, StoredBrick<u8>>),
-    U16(HashMap<BrickId, StoredBrick<u16>>),
-    F32(HashMap<BrickId, StoredBrick<f32>>),
-}
 
 /// A texel type that the executor stores and samples.
 pub(crate) trait Texel: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 'static {
@@ -23,10 +12,14 @@ pub(crate) trait Texel: Copy + Default + PartialOrd + Send + Sync + std::fmt::De
 
     fn to_f32(self) -> f32;
 
-    fn is_blank(self) -> bool;
+    /// The texels of a brick, if they are of this type.
+    fn of(texels: Texels<'_>) -> Option<&[Self]>;
 
     /// The range of no texel at all: the largest first.
-    fn empty_range() -> [Self; 2];
+    const EMPTY_RANGE: [Self; 2];
+
+    /// The range that a texel also is in; a blank one changes nothing.
+    fn include(range: [Self; 2], texel: Self) -> [Self; 2];
 
     /// The corners of one cell per lane. `rows` are four views of one brick, of the same length: the row of
     /// the cell's lower corner, the row above it, and the same two one slice further; `at` is the offset of
@@ -55,19 +48,20 @@ fn halves<S: Simd>(simd: S, packed: u32x16<S>) -> [f32x16<S>; 2] {
 
 impl Texel for u8 {
     const CAN_BE_BLANK: bool = false;
+    const EMPTY_RANGE: [Self; 2] = [u8::MAX, u8::MIN];
 
     #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
 
-    #[inline(always)]
-    fn is_blank(self) -> bool {
-        false
+    fn of(texels: Texels<'_>) -> Option<&[Self]> {
+        if let Texels::U8(texels) = texels { Some(texels) } else { None }
     }
 
-    fn empty_range() -> [Self; 2] {
-        [u8::MAX, u8::MIN]
+    #[inline(always)]
+    fn include([low, high]: [Self; 2], texel: Self) -> [Self; 2] {
+        [low.min(texel), high.max(texel)]
     }
 
     #[inline(always)]
@@ -92,19 +86,20 @@ impl Texel for u8 {
 
 impl Texel for u16 {
     const CAN_BE_BLANK: bool = false;
+    const EMPTY_RANGE: [Self; 2] = [u16::MAX, u16::MIN];
 
     #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
 
-    #[inline(always)]
-    fn is_blank(self) -> bool {
-        false
+    fn of(texels: Texels<'_>) -> Option<&[Self]> {
+        if let Texels::U16(texels) = texels { Some(texels) } else { None }
     }
 
-    fn empty_range() -> [Self; 2] {
-        [u16::MAX, u16::MIN]
+    #[inline(always)]
+    fn include([low, high]: [Self; 2], texel: Self) -> [Self; 2] {
+        [low.min(texel), high.max(texel)]
     }
 
     #[inline(always)]
@@ -132,19 +127,20 @@ impl Texel for u16 {
 
 impl Texel for f32 {
     const CAN_BE_BLANK: bool = true;
+    const EMPTY_RANGE: [Self; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
     #[inline(always)]
     fn to_f32(self) -> f32 {
         self
     }
 
-    #[inline(always)]
-    fn is_blank(self) -> bool {
-        !self.is_finite()
+    fn of(texels: Texels<'_>) -> Option<&[Self]> {
+        if let Texels::F32(texels) = texels { Some(texels) } else { None }
     }
 
-    fn empty_range() -> [Self; 2] {
-        [f32::INFINITY, f32::NEG_INFINITY]
+    #[inline(always)]
+    fn include([low, high]: [Self; 2], texel: Self) -> [Self; 2] {
+        if texel.is_finite() { [low.min(texel), high.max(texel)] } else { [low, high] }
     }
 
     #[inline(always)]

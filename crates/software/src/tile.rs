@@ -1,16 +1,15 @@
 //! The picture in tiles: which bricks a tile can meet, and the packets of a tile.
 
-use std::collections::HashMap;
-
 use fearless_simd::{Level, dispatch, mask32x16, prelude::*};
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_frame::{BrickId, DrawError, Frame, PlacedBrick, VolumeLayout};
+use volery_frame::{DrawError, Frame, PlacedBrick, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::{Occupancy, StoredBrick, block_cells};
 use crate::packet::{PACKET, Packet};
+use crate::pool::Bricks;
 use crate::texel::Texel;
 use crate::walk::{Light, Matter, Table, walk};
 
@@ -43,7 +42,7 @@ pub(crate) fn draw<T: Texel>(
     level: Level,
     frame: &Frame<'_>,
     layout: &VolumeLayout,
-    bricks: &HashMap<BrickId, StoredBrick<T>>,
+    bricks: &Bricks<T>,
 ) -> Result<Vec<[f32; 3]>, DrawError> {
     let [scale, offset] = frame.transfer.bin_from_value();
     let bin_from_texel = [(scale * layout.value_scale) as f32, (scale * layout.value_offset + offset) as f32];
@@ -87,7 +86,11 @@ fn drawable<'a, T: Texel>(
     placed: &PlacedBrick,
     brick: &'a StoredBrick<T>,
 ) -> Option<Drawable<'a, T>> {
-    let bounds = placed.bounds(layout).map(|corner| corner.map(f64::from));
+    let [low, high] = placed.bounds(layout);
+    // A short brick leaves the rest of its node empty.
+    let held = |axis: usize| low[axis] + ((brick.samples[axis] - 1) << placed.level);
+    let high = std::array::from_fn(|axis| f64::from(high[axis].min(held(axis))));
+    let bounds = [low.map(f64::from), high];
     let tiles = projector.tiles(bounds)?;
     let occupancy = brick.occupancy(frame.transfer, bin_from_texel)?;
     Some(Drawable { brick, occupancy, level: placed.level, bounds, tiles })

@@ -8,7 +8,7 @@ use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::Occupancy;
-use crate::math::{axes, four, opacity_of_depth};
+use crate::math::{axes, four, front_weight, opacity_of_depth};
 use crate::packet::Span;
 use crate::texel::Texel;
 
@@ -93,19 +93,63 @@ impl<S: Simd> Light<S> {
         Self { color: [f32x16::splat(simd, 0.0); 3], transmittance: f32x16::splat(simd, 1.0) }
     }
 
-    /// Adds a piece of `length` between two ends.
+    /// Adds two neighbouring pieces of `length` each. What their mean colours differ by tells how the colour
+    /// runs within each, so how much more of its front is seen than of its back.
     #[inline(always)]
-    fn add(&mut self, simd: S, from: &End<S>, to: &End<S>, length: f32x16<S>) {
-        let zero = f32x16::splat(simd, 0.0);
-        let bins: f32x16<S> = (to.bin - from.bin).to_float();
-        let extinction = to.integrals[3] - from.integrals[3];
-        let alpha = opacity_of_depth(simd, length * extinction / bins);
-        let weight = extinction.simd_ne(zero).select(self.transmittance * alpha / extinction, zero);
+    fn add(&mut self, simd: S, ends: [&End<S>; 3], length: f32x16<S>) {
+        let pieces = [Piece::new(simd, ends[0], ends[1], length), Piece::new(simd, ends[1], ends[2], length)];
+        // Where one piece is much thinner than the other, its colour tells little of the other's.
+        let (a, b) = (pieces[0].depth, pieces[1].depth);
+        let (thin, thick) = (a.min(b), a.max(b));
+        let trust = thick.simd_gt(0.0).select(thin / thick, f32x16::splat(simd, 0.0));
+        let slope = axes(
+            #[inline(always)]
+            |i| (pieces[1].color(i) - pieces[0].color(i)) * trust,
+        );
+        self.add_piece(simd, &pieces[0], &slope);
+        self.add_piece(simd, &pieces[1], &slope);
+    }
+
+    #[inline(always)]
+    fn add_piece(&mut self, simd: S, piece: &Piece<S>, slope: &[f32x16<S>; 3]) {
+        let alpha = opacity_of_depth(simd, piece.depth);
+        let light = self.transmittance * alpha;
+        let shift = front_weight(simd, piece.depth);
         self.color = axes(
             #[inline(always)]
-            |i| weight.mul_add(to.integrals[i] - from.integrals[i], self.color[i]),
+            |i| light.mul_add(piece.color(i) - slope[i] * shift, self.color[i]),
         );
-        self.transmittance = self.transmittance - self.transmittance * alpha;
+        self.transmittance -= light;
+    }
+}
+
+/// A piece of ray along which the field is taken as linear.
+struct Piece<S: Simd> {
+    /// Colour times extinction times bins.
+    light: [f32x16<S>; 3],
+    /// `1 / extinction`, or 0.
+    inverse: f32x16<S>,
+    /// Optical depth.
+    depth: f32x16<S>,
+}
+
+impl<S: Simd> Piece<S> {
+    #[inline(always)]
+    fn new(simd: S, from: &End<S>, to: &End<S>, length: f32x16<S>) -> Self {
+        let bins: f32x16<S> = (to.bin - from.bin).to_float();
+        let extinction = to.integrals[3] - from.integrals[3];
+        let inverse = extinction.simd_ne(0.0).select(1.0 / extinction, f32x16::splat(simd, 0.0));
+        let light = axes(
+            #[inline(always)]
+            |i| to.integrals[i] - from.integrals[i],
+        );
+        Self { light, inverse, depth: length * extinction / bins }
+    }
+
+    /// Mean colour, weighted by extinction; black if there is none.
+    #[inline(always)]
+    fn color(&self, channel: usize) -> f32x16<S> {
+        self.light[channel] * self.inverse
     }
 }
 
@@ -259,6 +303,17 @@ impl<S: Simd> Cell<S> {
     }
 }
 
+/// The value for the middle of a cell, so that each of the straight lines to it from the cell's ends has the mean
+/// of the field over its half, to second order: a parabola bulges from its chord by a third of what the middle
+/// must give. Only where the field runs one way, and never past the ends: no value appears that is not there.
+#[inline(always)]
+fn balanced<S: Simd>(first: f32x16<S>, middle: f32x16<S>, last: f32x16<S>) -> f32x16<S> {
+    let (low, high) = (first.min(last), first.max(last));
+    let moved = (middle * 8.0 - first - last) * (1.0 / 6.0);
+    let one_way = middle.simd_ge(low) & middle.simd_le(high);
+    one_way.select(moved.max(low).min(high), middle)
+}
+
 /// Adds the light of one brick to a packet.
 #[inline(always)]
 pub(crate) fn walk<S: Simd, T: Texel>(
@@ -280,6 +335,7 @@ pub(crate) fn walk<S: Simd, T: Texel>(
     // Lanes whose last piece ended elsewhere than where the next begins.
     let mut fresh = walker.active;
     let mut from = table.at(simd, i32x16::splat(simd, 0));
+    let mut first = zero;
     loop {
         loop {
             let empty = walker.in_empty_block(simd, occupancy);
@@ -307,17 +363,19 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         let half = (end - walker.depth) * 0.5;
         if fresh.any_true() {
             let value = cell.value(walker.fraction(simd, walker.depth));
+            first = fresh.select(value, first);
             from = table.at(simd, fresh.select(table.bin(simd, value), from.bin));
         }
         let middle = cell.value(walker.fraction(simd, walker.depth + half));
         let last = cell.value(walker.fraction(simd, end));
+        let middle = balanced(first, middle, last);
+        first = last;
         // A blank corner makes every value of its cell NaN or infinite.
         let blank = if T::CAN_BE_BLANK { !middle.is_finite() } else { mask32x16::splat(simd, false) };
         let length = (walker.active & !blank).select(half, zero);
         let middle = table.end(simd, middle, from.bin);
-        light.add(simd, &from, &middle, length);
         let last = table.end(simd, last, middle.bin);
-        light.add(simd, &middle, &last, length);
+        light.add(simd, [&from, &middle, &last], length);
         from = last;
         fresh = blank;
 

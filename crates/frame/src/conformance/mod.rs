@@ -1,0 +1,148 @@
+//! The suite that every backend passes: one function per property, each panics with what it measured.
+//!
+//! # Method
+//! Pictures are compared with closed forms where there are any, else with a slow march in f64 through the
+//! field that the bricks were cut from ([`march`](oracle::march)), midpoint rule, many steps per cell. The
+//! marcher shares nothing with a backend but the camera's rays and the transfer function. Every check
+//! prints its threshold beside the value that it measured.
+//!
+//! # What a backend may do
+//! - Stop a ray once it lets through less than [`STOP_TRANSMITTANCE`] of the light; thresholds allow for it.
+//! - Round values to the bins of the frame's [`IntegratedTransfer`](crate::IntegratedTransfer).
+//! - Nothing else: no sampling distance, no guard distance at the faces of bricks or of the volume.
+//!
+//! # Use
+//! ```ignore
+//! volery_frame::conformance_tests!(MyBackend::new());
+//! ```
+//! makes a `#[test]` of each property, each with a fresh backend; [`ALL`] lists them for other runners.
+
+#![allow(clippy::missing_panics_doc, reason = "every property panics where it does not hold")]
+
+mod compositing;
+mod levels;
+mod matter;
+mod oracle;
+mod order;
+mod requests;
+mod sampling;
+mod views;
+mod world;
+
+use crate::Backend;
+
+/// A ray that lets through less than this may stop.
+pub const STOP_TRANSMITTANCE: f64 = 1.0 / 4096.0;
+
+/// A property: its name and its check.
+pub type Property = (&'static str, fn(&mut dyn Backend));
+
+/// Lists the properties once: as functions, as a table, and as a macro that makes tests of them.
+macro_rules! properties {
+    ($d:tt $($module:ident: $($name:ident)+;)+) => {
+        $(pub use $module::{$($name),+};)+
+
+        /// Every property.
+        pub const ALL: &[Property] = &[$($((stringify!($name), $name),)+)+];
+
+        /// Makes a `#[test]` of each property of the conformance suite. The argument is an expression that
+        /// makes a backend.
+        #[macro_export]
+        macro_rules! conformance_tests {
+            ($d backend:expr) => {
+                $($(
+                    #[test]
+                    fn $name() {
+                        $d crate::conformance::$name(&mut $d backend);
+                    }
+                )+)+
+            };
+        }
+    };
+}
+
+properties! { $
+    matter:
+        uniform_cube_in_perspective
+        uniform_cube_orthographic
+        linear_ramp_is_the_closed_form
+        color_ramp_matches_the_march
+        no_extinction_shows_the_background
+        extinction_of_1e_minus_30_changes_nothing
+        nearly_opaque_matter
+        opaque_matter_hides_what_is_behind
+        opaque_step_stands_at_its_value
+        thin_shell_is_not_missed;
+    views:
+        eye_inside
+        eye_on_the_corner_of_bricks
+        eye_on_the_face_of_a_brick
+        eye_on_a_corner_of_the_volume
+        axis_aligned_views_on_sample_planes
+        eye_a_million_cells_away
+        camera_looking_away_sees_the_background
+        volume_behind_the_orthographic_plane
+        smooth_field_in_perspective;
+    sampling:
+        tiny_spacing
+        huge_spacing
+        anisotropic_spacing
+        dims_that_bricks_do_not_divide
+        axes_of_two_samples
+        axes_of_one_sample_show_nothing
+        texel_types_agree
+        scale_and_offset_of_values
+        range_of_negative_values
+        constant_volume
+        blank_samples_clear_the_cells_that_touch_them
+        volume_of_blanks_shows_the_background
+        small_bricks_and_large_ones_agree;
+    levels:
+        ramp_is_the_same_in_mixed_levels
+        coarse_bricks_end_with_the_domain
+        coarse_levels_draw_what_they_hold
+        absent_bricks_are_empty
+        short_bricks_leave_their_rest_empty;
+    compositing:
+        thousands_of_thin_layers
+        dense_matter_stops_rays_unseen
+        background_shines_through;
+    order:
+        error_falls_with_the_square_of_the_cell;
+    requests:
+        pictures_of_every_size
+        picture_sizes_out_of_range_are_refused
+        the_same_frame_gives_the_same_bits
+        order_of_uploads_does_not_matter
+        transfer_functions_can_change_between_frames
+        a_frame_without_bricks_is_background
+        drawing_needs_a_volume
+        upload_needs_a_volume
+        missing_bricks_are_named
+        misplaced_bricks_are_named
+        bricks_that_do_not_fit_are_refused_and_change_nothing
+        bricks_of_the_same_name_are_replaced
+        a_new_volume_forgets_bricks
+        resident_bytes_count_the_texels
+        many_uploads_one_by_one;
+}
+
+#[cfg(test)]
+mod tests {
+    /// A property that is written but not listed would never run.
+    #[test]
+    fn every_property_is_listed() {
+        let sources = [
+            include_str!("matter.rs"),
+            include_str!("views.rs"),
+            include_str!("sampling.rs"),
+            include_str!("levels.rs"),
+            include_str!("compositing.rs"),
+            include_str!("order.rs"),
+            include_str!("requests.rs"),
+        ];
+        let written = sources.iter().flat_map(|text| text.lines());
+        let written: Vec<_> = written.filter(|line| line.starts_with("pub fn ")).collect();
+        assert_eq!(written.len(), super::ALL.len(), "{written:#?}");
+    }
+}

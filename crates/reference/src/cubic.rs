@@ -1,0 +1,177 @@
+//! A cubic polynomial on [0, 1] in Bernstein form: the field along a ray through one cell.
+
+/// `Σ bᵢ Bᵢ(t)`. Its values lie in the range of its coefficients, and it starts and ends at the outer two.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cubic {
+    bernstein: [f64; 4],
+    power: [f64; 4],
+}
+
+impl Cubic {
+    pub(crate) fn new(bernstein: [f64; 4]) -> Self {
+        let [a, b, c, d] = bernstein;
+        let power = [a, 3.0 * (b - a), 3.0 * ((c - b) - (b - a)), (d - c) - 2.0 * (c - b) + (b - a)];
+        Self { bernstein, power }
+    }
+
+    #[inline]
+    pub(crate) fn at(&self, t: f64) -> f64 {
+        let [a, b, c, d] = self.power;
+        a + t * (b + t * (c + t * d))
+    }
+
+    fn slope_at(&self, t: f64) -> f64 {
+        let [_, b, c, d] = self.power;
+        b + t * (2.0 * c + t * 3.0 * d)
+    }
+
+    /// A range that holds every value on [0, 1].
+    pub(crate) fn range(&self) -> [f64; 2] {
+        let [a, b, c, d] = self.bernstein;
+        [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
+    }
+
+    /// At least the steepest slope on [0, 1].
+    pub(crate) fn max_slope(&self) -> f64 {
+        let [a, b, c, d] = self.bernstein;
+        3.0 * (b - a).abs().max((c - b).abs()).max((d - c).abs())
+    }
+
+    /// Where the slope changes its sign inside (0, 1), in order; `None`s last.
+    fn turns(&self) -> [Option<f64>; 2] {
+        let [_, b, c, d] = self.power;
+        // b + 2 c t + 3 d t² = 0; the two forms of its roots that do not cancel.
+        let discriminant = c * c - 3.0 * d * b;
+        if discriminant.is_nan() || discriminant < 0.0 {
+            return [None; 2];
+        }
+        let q = -(c + discriminant.sqrt().copysign(c));
+        let inside = |t: f64| (t > 0.0 && t < 1.0).then_some(t);
+        match [inside(q / (3.0 * d)), inside(b / q)] {
+            [Some(s), Some(t)] if s > t => [Some(t), Some(s)],
+            [None, some] => [some, None],
+            roots => roots,
+        }
+    }
+
+    /// Calls `found(t)` for every place in (0, 1) where the field turns or crosses one of `edges(low, high)`,
+    /// the interesting values strictly between two values; in no particular order.
+    pub(crate) fn splits<'e>(&self, edges: impl Fn(f64, f64) -> &'e [f64], mut found: impl FnMut(f64)) {
+        let mut section = |from: f64, to: f64| {
+            let (a, b) = (self.at(from), self.at(to));
+            for &value in edges(a.min(b), a.max(b)) {
+                found(self.crossing(value, from, to));
+            }
+            if to < 1.0 {
+                found(to);
+            }
+        };
+        let mut from = 0.0;
+        for turn in self.turns().into_iter().flatten() {
+            section(from, turn);
+            from = turn;
+        }
+        section(from, 1.0);
+    }
+
+    /// Where the field, monotone from `from` to `to`, has a value strictly between those at the two:
+    /// Newton's method kept inside a shrinking bracket, to the last bits of `t`.
+    fn crossing(&self, value: f64, from: f64, to: f64) -> f64 {
+        let (mut below, mut above) = if self.at(from) < value { (from, to) } else { (to, from) };
+        let mut t = (from + to) / 2.0;
+        // A bisection ends within 60 steps; Newton's steps, where taken, at least do not widen the bracket.
+        for _ in 0..120 {
+            let residual = self.at(t) - value;
+            if residual == 0.0 {
+                break;
+            }
+            if residual < 0.0 {
+                below = t;
+            } else {
+                above = t;
+            }
+            let (low, high) = (below.min(above), below.max(above));
+            let newton = t - residual / self.slope_at(t);
+            let next = if newton > low && newton < high { newton } else { low + (high - low) / 2.0 };
+            if (next - t).abs() <= f64::EPSILON * next {
+                break;
+            }
+            t = next;
+        }
+        t
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn splits_at(cubic: &Cubic, edges: &[f64]) -> Vec<f64> {
+        let mut found = Vec::new();
+        let between = |low: f64, high: f64| {
+            let first = edges.partition_point(|&e| e <= low);
+            let end = first + edges[first..].partition_point(|&e| e < high);
+            &edges[first..end]
+        };
+        cubic.splits(between, |t| found.push(t));
+        found.sort_by(f64::total_cmp);
+        found
+    }
+
+    #[test]
+    fn three_crossings_of_one_value_are_found_to_the_last_bits() {
+        // (t - 1/8)(t - 1/2)(t - 3/4), from its power form.
+        let (p, q, r) = (0.125, 0.5, 0.75);
+        let power = [-p * q * r, p * q + p * r + q * r, -(p + q + r), 1.0];
+        let bernstein = [
+            power[0],
+            power[0] + power[1] / 3.0,
+            power[0] + 2.0 * power[1] / 3.0 + power[2] / 3.0,
+            power.iter().sum(),
+        ];
+        let cubic = Cubic::new(bernstein);
+        let found = splits_at(&cubic, &[0.0]);
+        assert_eq!(found.len(), 5, "three crossings and two turns: {found:?}");
+        for root in [p, q, r] {
+            assert!(found.iter().any(|t| (t - root).abs() < 1e-15), "{root} in {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_constant_and_a_line_do_not_turn() {
+        assert!(splits_at(&Cubic::new([7.3; 4]), &[7.3]).is_empty());
+        let line = Cubic::new([0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(splits_at(&line, &[1.5]), [0.5]);
+    }
+
+    proptest! {
+        #[test]
+        fn between_splits_the_field_is_monotone_and_crosses_nothing(
+            bernstein in proptest::array::uniform4(-2i32..=2),
+            edges in proptest::collection::btree_set(-4i32..=4, 1..4),
+        ) {
+            // Small integers make double roots, flat ends and exact hits common.
+            let cubic = Cubic::new(bernstein.map(f64::from));
+            let edges: Vec<f64> = edges.into_iter().map(|e| f64::from(e) / 2.0).collect();
+            let mut ends = vec![0.0];
+            ends.extend(splits_at(&cubic, &edges));
+            ends.push(1.0);
+            for pair in ends.windows(2) {
+                prop_assert!(pair[0] <= pair[1]);
+                let values: Vec<f64> =
+                    (0..=16).map(|i| cubic.at(pair[0] + (pair[1] - pair[0]) * f64::from(i) / 16.0)).collect();
+                let (rise, fall) = (values[16] >= values[0], values[16] <= values[0]);
+                for w in values.windows(2) {
+                    prop_assert!((rise && w[1] >= w[0] - 1e-15) || (fall && w[1] <= w[0] + 1e-15));
+                }
+                for &edge in &edges {
+                    let inside = |v: f64| (v - edge).abs() > 4e-15;
+                    let above = values.iter().any(|&v| inside(v) && v > edge);
+                    let below = values.iter().any(|&v| inside(v) && v < edge);
+                    prop_assert!(!(above && below), "{:?} crosses {}", pair, edge);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! The resident bricks, all of one texel type.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+use volery_frame::{Brick, BrickId, TexelType};
+
+use crate::brick::StoredBrick;
+use crate::texel::Texel;
+
+/// Bricks by name.
+pub(crate) type Bricks<T> = HashMap<BrickId, StoredBrick<T>>;
+
+/// Resident bricks.
+#[derive(Debug)]
+pub(crate) enum Pool {
+    U8(Bricks<u8>),
+    U16(Bricks<u16>),
+    F32(Bricks<f32>),
+}
+
+/// Runs one generic expression for whatever type a pool holds.
+macro_rules! for_bricks {
+    ($pool:expr, |$bricks:ident| $body:expr) => {
+        match $pool {
+            $crate::pool::Pool::U8($bricks) => $body,
+            $crate::pool::Pool::U16($bricks) => $body,
+            $crate::pool::Pool::F32($bricks) => $body,
+        }
+    };
+}
+pub(crate) use for_bricks;
+
+impl Pool {
+    pub(crate) fn new(texel: TexelType) -> Self {
+        match texel {
+            TexelType::U8 => Self::U8(HashMap::new()),
+            TexelType::U16 => Self::U16(HashMap::new()),
+            TexelType::F32 => Self::F32(HashMap::new()),
+        }
+    }
+
+    pub(crate) fn contains(&self, id: BrickId) -> bool {
+        for_bricks!(self, |bricks| bricks.contains_key(&id))
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        for_bricks!(self, |bricks| bricks.values().map(StoredBrick::bytes).sum())
+    }
+
+    /// Adds bricks that were checked against the layout; blocks have `block` cells per axis.
+    pub(crate) fn insert(&mut self, new: &[Brick<'_>], block: u32) {
+        fn stored<T: Texel>(new: &[Brick<'_>], block: u32) -> Vec<(BrickId, StoredBrick<T>)> {
+            let store = |brick: &Brick<'_>| {
+                T::of(brick.texels).map(|texels| (brick.id, StoredBrick::new(brick.samples, texels, block)))
+            };
+            new.par_iter().filter_map(store).collect()
+        }
+        for_bricks!(self, |bricks| bricks.extend(stored(new, block)));
+    }
+}
