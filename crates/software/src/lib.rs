@@ -16,8 +16,11 @@
 //! that may hold matter under its transfer function, 512 bits in one SIMD register; lanes leap over the others.
 //!
 //! # Error
-//! A half cell is integrated as if the field were linear over it: of second order in the size of a cell, and
-//! nothing at all along the axes, where the field is linear. Values are rounded to the table's bins (at most
+//! A half cell is integrated as if the field were linear over it, a quarter where the cubic bends much: of second
+//! order in the size of a cell, and nothing at all along the axes, where the field is linear. The straight lines
+//! are laid so that their means are those of the field, and what the colours of neighbouring pieces differ by
+//! tells how much more of a piece's front is seen than of its back; the two together take two thirds off what is
+//! left (engine, 512x512: rmse 3.9e-4 without, 1.3e-4 with). Values are rounded to the table's bins (at most
 //! 1/8192 of the range). A ray ends when less than [`MIN_TRANSMITTANCE`] of what lies behind can come
 //! through, and that rest is dropped. Sums are in f32.
 //!

@@ -16,6 +16,10 @@ use crate::walk::{Light, Matter, Table, walk};
 /// Pixels of a tile per axis, a multiple of [`PACKET`].
 const TILE: u32 = 32;
 
+/// A cell is integrated in four pieces instead of two where the field bends by more than this share of the value
+/// range. Measured on heptane, 512x512: rmse 3.9e-4 without, 1.4e-4 at 0.1, 0.8e-4 at 0.05, each in the same time.
+const MAX_BEND: f32 = 0.05;
+
 /// A brick of this frame that holds matter.
 struct Drawable<'a, T> {
     brick: &'a StoredBrick<T>,
@@ -58,7 +62,8 @@ pub(crate) fn draw<T: Texel>(
         .into_par_iter()
         .filter_map(|(placed, brick)| drawable(frame, layout, &projector, bin_from_texel, placed, brick))
         .collect();
-    let table = Table { entries: frame.transfer.entries(), bin_from_texel };
+    let max_bend = MAX_BEND * frame.transfer.num_bins() as f32 / bin_from_texel[0].abs();
+    let table = Table { entries: frame.transfer.entries(), bin_from_texel, max_bend };
     let rays = frame.camera.rays(frame.width, frame.height);
     let shared = Shared { frame, layout, rays, table, drawables };
 

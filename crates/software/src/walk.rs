@@ -34,6 +34,9 @@ pub(crate) struct Table<'a> {
     pub(crate) entries: &'a [[f32; 4]],
     /// `bin = scale * texel + offset`.
     pub(crate) bin_from_texel: [f32; 2],
+    /// A cell in which twice the middle differs from the sum of the ends by more than this, in texels, is
+    /// integrated in four pieces instead of two.
+    pub(crate) max_bend: f32,
 }
 
 /// The integrals at one end of a piece.
@@ -91,6 +94,23 @@ impl<S: Simd> Light<S> {
     #[inline(always)]
     pub(crate) fn none(simd: S) -> Self {
         Self { color: [f32x16::splat(simd, 0.0); 3], transmittance: f32x16::splat(simd, 1.0) }
+    }
+
+    /// Adds two pieces of `length` each, from `from` over the value `middle` to the value `last`; returns their end.
+    #[inline(always)]
+    fn gather(
+        &mut self,
+        simd: S,
+        table: Table<'_>,
+        from: End<S>,
+        middle: f32x16<S>,
+        last: f32x16<S>,
+        length: f32x16<S>,
+    ) -> End<S> {
+        let middle = table.end(simd, middle, from.bin);
+        let last = table.end(simd, last, middle.bin);
+        self.add(simd, [&from, &middle, &last], length);
+        last
     }
 
     /// Adds two neighbouring pieces of `length` each. What their mean colours differ by tells how the colour
@@ -368,15 +388,22 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         }
         let middle = cell.value(walker.fraction(simd, walker.depth + half));
         let last = cell.value(walker.fraction(simd, end));
-        let middle = balanced(first, middle, last);
-        first = last;
         // A blank corner makes every value of its cell NaN or infinite.
         let blank = if T::CAN_BE_BLANK { !middle.is_finite() } else { mask32x16::splat(simd, false) };
-        let length = (walker.active & !blank).select(half, zero);
-        let middle = table.end(simd, middle, from.bin);
-        let last = table.end(simd, last, middle.bin);
-        light.add(simd, [&from, &middle, &last], length);
-        from = last;
+        let lanes = walker.active & !blank;
+        let length = lanes.select(half, zero);
+        let bend = (middle + middle - first - last).abs();
+        if (bend.simd_gt(table.max_bend) & lanes).any_true() {
+            let quarter = half * 0.5;
+            let early = cell.value(walker.fraction(simd, walker.depth + quarter));
+            let late = cell.value(walker.fraction(simd, end - quarter));
+            let length = length * 0.5;
+            from = light.gather(simd, table, from, balanced(first, early, middle), middle, length);
+            from = light.gather(simd, table, from, balanced(middle, late, last), last, length);
+        } else {
+            from = light.gather(simd, table, from, balanced(first, middle, last), last, length);
+        }
+        first = last;
         fresh = blank;
 
         walker.step(simd, &exit, end);
