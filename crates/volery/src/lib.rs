@@ -1,1 +1,52 @@
-//! Volume visualisation at the resolution that a picture, a deadline or a memory budget needs.
+//! Volume visualisation: from a file to a picture, its time, and its distance from the truth.
+//!
+//! # Objects
+//! - An [`Input`] is a file with what a scene file says about it; [`read_input`] reads it.
+//! - A [`Backend`] draws: [`open_backend`] takes the best there is.
+//! - A [`Session`] holds one volume's pyramid and what is resident in a backend. [`Session::open`] costs one
+//!   walk over the samples; after that every picture costs what changed.
+//! - A [`View`] says what to see: size, camera, transfer function, background, and the dial `tolerance`.
+//!   [`Session::view`] fills in what a user leaves open.
+//! - A [`Picture`] is pixels and a [`Report`]; [`Session::verify`] adds its distance from the exact picture.
+//!
+//! # Guarantees
+//! - The same bits for any number of threads.
+//! - A tolerance of 0 is the full resolution, bit for bit.
+//! - Beside the samples and what the backend keeps, drawing needs the coarse levels (1/7 of the samples) and
+//!   [`technique::raycast::BATCH_BYTES`].
+//! - No input panics. An error is one line that says what was found and what was expected.
+//!
+//! # Non-goals
+//! Lighting and shading; windows and interaction; unstructured grids, which come with their own issue.
+
+mod backend;
+pub mod fit;
+pub mod histogram;
+pub mod info;
+mod input;
+pub mod output;
+pub mod report;
+mod session;
+pub mod technique;
+mod texels;
+pub mod transfer;
+
+pub use backend::{BackendChoice, BackendError, open_backend};
+pub use histogram::Histogram;
+pub use info::Info;
+pub use input::{Input, InputError, read_input};
+pub use report::Report;
+pub use session::{BACKGROUND, OpenError, Picture, RenderError, Session, VerifyError, View, ViewOptions};
+pub use transfer::{ColorMap, Preset};
+
+pub use glam;
+pub use volery_frame::{Backend, Device, DeviceKind, Image};
+pub use volery_io as io;
+pub use volery_reference as reference;
+pub use volery_scene::{
+    Camera, ControlPoint, Projection, SampleType, Samples, TransferFunction, VoxelGrid, camera, grid,
+};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,222 @@
+//! The command line.
+
+use std::path::{Path, PathBuf};
+
+use clap::builder::{OsStringValueParser, PathBufValueParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use volery::fit::Direction;
+use volery::{BackendChoice, Preset};
+
+/// Draws scientific volumes and says how far the picture is from the truth.
+#[derive(Debug, Parser)]
+#[command(name = "volery", version, max_term_width = 110, arg_required_else_help = false)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Threads to use; as many as there are cores if missing
+    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Draw a volume
+    Render(RenderArgs),
+    /// Say what a file is: kind, dims, type, spacing, range, histogram
+    Info(InfoArgs),
+    /// Draw generated volumes in every way there is; needs no file
+    Demo(DemoArgs),
+}
+
+/// `volery render`
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  volery render head.nii.gz -o head.png
+  volery render engine_256x256x128_uint8.raw -o engine.exr --view 35,20,1.5 --transfer viridis
+  volery render scene.json --data volumes -o scene.png --tolerance 0.02 --verify --report scene.report.json
+
+Transfer functions by name: auto, ramp, ct-bone, ct-soft-tissue (both in Hounsfield units), mri,
+and the colour maps grayscale, viridis, inferno, plasma, magma, turbo, cool-to-warm, black-body.
+A file holds control points as a scene does, or a colour map that ParaView saved.")]
+pub(crate) struct RenderArgs {
+    /// A scene file, or a volume: .raw (.gz, .zst), .nii (.gz), .nrrd, .nhdr, .mha, .mhd, .vti, .tif, a
+    /// folder of slices
+    #[arg(value_name = "SCENE.json|FILE")]
+    pub(crate) input: PathBuf,
+    /// The picture: 8 bits as .png, 32-bit floats as .exr
+    #[arg(short, long, value_name = "OUT.png|OUT.exr",
+        value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["png", "exr"])))]
+    pub(crate) output: PathBuf,
+    /// How to draw
+    #[arg(long, value_enum, default_value_t = Technique::Auto)]
+    pub(crate) technique: Technique,
+    /// Width and height of the picture in pixels [default: the scene's, else 768x768]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub(crate) size: Option<[u32; 2]>,
+    /// From where to look, in degrees, and how near [default: the scene's, else 35,22,1]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION[,ZOOM]", value_parser = parse_view, allow_hyphen_values = true)]
+    pub(crate) view: Option<Direction>,
+    /// Parallel rays in place of perspective
+    #[arg(long)]
+    pub(crate) orthographic: bool,
+    /// Values to colour and opacity [default: the scene's, else auto]
+    #[arg(long, value_name = "FILE.json|PRESET",
+        value_parser = OsStringValueParser::new().try_map(parse_transfer))]
+    pub(crate) transfer: Option<Transfer>,
+    /// Largest difference of a value from the full resolution, as a fraction of the file's value range
+    #[arg(long, value_name = "T", value_parser = parse_tolerance, allow_negative_numbers = true)]
+    pub(crate) tolerance: Option<f64>,
+    /// Folder that the paths in a scene file are relative to [default: that of the scene file]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// Who draws: auto is a GPU if there is one, else software
+    #[arg(long, value_enum, default_value_t = BackendName::Auto)]
+    pub(crate) backend: BackendName,
+    /// Measure the distance from the exact picture; takes its time
+    #[arg(long)]
+    pub(crate) verify: bool,
+    /// Write the differences from the exact picture, amplified by the power of two that is printed
+    #[arg(long, value_name = "OUT.png",
+        value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["png", "exr"])))]
+    pub(crate) error_map: Option<PathBuf>,
+    /// Write input, times, work and error as JSON
+    #[arg(long, value_name = "OUT.json")]
+    pub(crate) report: Option<PathBuf>,
+    /// Draw the picture so often, and report the time of each and their median
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) frames: u32,
+}
+
+/// `volery info`
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  volery info head.nii.gz")]
+pub(crate) struct InfoArgs {
+    /// A volume, an image, or a scene file
+    #[arg(value_name = "FILE")]
+    pub(crate) input: PathBuf,
+    /// Folder that the path in a scene file is relative to [default: that of the scene file]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// As JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `volery demo`
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  volery demo -o pictures")]
+pub(crate) struct DemoArgs {
+    /// Folder for the pictures
+    #[arg(short, long, value_name = "DIR", default_value = "volery-demo")]
+    pub(crate) output: PathBuf,
+    /// Who draws: auto is a GPU if there is one, else software
+    #[arg(long, value_enum, default_value_t = BackendName::Auto)]
+    pub(crate) backend: BackendName,
+}
+
+/// How to draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Technique {
+    /// What suits the input: raycast for volumes
+    Auto,
+    /// One ray per pixel through the nodes of a cut
+    Raycast,
+}
+
+/// Who draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BackendName {
+    /// A GPU if there is one, else software
+    Auto,
+    /// The CPU, all cores
+    Software,
+    /// The best device that wgpu finds
+    Wgpu,
+}
+
+impl From<BackendName> for BackendChoice {
+    fn from(name: BackendName) -> Self {
+        match name {
+            BackendName::Auto => Self::Auto,
+            BackendName::Software => Self::Software,
+            BackendName::Wgpu => Self::Wgpu,
+        }
+    }
+}
+
+/// Where a transfer function comes from.
+#[derive(Clone, Debug)]
+pub(crate) enum Transfer {
+    Preset(Preset),
+    File(PathBuf),
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|found| endings.iter().any(|ending| found.eq_ignore_ascii_case(ending)))
+}
+
+fn with_ending(path: PathBuf, endings: &[&str]) -> Result<PathBuf, String> {
+    let expected = || format!("expected a name that ends in .{}", endings.join(" or ."));
+    if has_ending(&path, endings) { Ok(path) } else { Err(expected()) }
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let numbers = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    let size = numbers.ok_or("expected WIDTHxHEIGHT in pixels, such as 800x600")?;
+    volery::io::scene_file::check_size(size).map_err(|problem| problem.to_string())?;
+    Ok(size)
+}
+
+fn parse_view(text: &str) -> Result<Direction, String> {
+    let expected = "expected AZIMUTH,ELEVATION or AZIMUTH,ELEVATION,ZOOM: degrees, and a zoom above 0";
+    let numbers: Vec<f64> =
+        text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| expected)?;
+    let (azimuth_deg, elevation_deg, zoom) = match numbers[..] {
+        [azimuth, elevation] => (azimuth, elevation, 1.0),
+        [azimuth, elevation, zoom] => (azimuth, elevation, zoom),
+        _ => return Err(expected.to_owned()),
+    };
+    let good = azimuth_deg.is_finite() && elevation_deg.is_finite() && (1e-3..=1e3).contains(&zoom);
+    let wrong = || "expected finite degrees, and a zoom from 0.001 to 1000".to_owned();
+    good.then_some(Direction { azimuth_deg, elevation_deg, zoom }).ok_or_else(wrong)
+}
+
+fn parse_tolerance(text: &str) -> Result<f64, String> {
+    let found: Option<f64> = text.parse().ok();
+    let good = found.filter(|tolerance| (0.0..=1.0).contains(tolerance));
+    good.ok_or_else(|| "expected a fraction of the value range, from 0 to 1".to_owned())
+}
+
+fn parse_transfer(name: std::ffi::OsString) -> Result<Transfer, String> {
+    if let Some(preset) = name.to_str().and_then(Preset::from_name) {
+        return Ok(Transfer::Preset(preset));
+    }
+    let path = PathBuf::from(name);
+    if has_ending(&path, &["json"]) {
+        return Ok(Transfer::File(path));
+    }
+    let names: Vec<_> = Preset::all().map(Preset::name).collect();
+    Err(format!("expected a file that ends in .json, or one of {}", names.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_names_every_preset() {
+        let help = Cli::command().find_subcommand_mut("render").unwrap().render_help().to_string();
+        for preset in Preset::all() {
+            assert!(help.contains(preset.name()), "{}", preset.name());
+        }
+    }
+}

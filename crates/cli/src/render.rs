@@ -1,0 +1,154 @@
+//! `volery render`
+
+use std::path::Path;
+
+use volery::fit::{self, Direction};
+use volery::io::transfer::TransferOptions;
+use volery::io::{read_transfer, write_atomically};
+use volery::output::{ErrorMap, write_image};
+use volery::{
+    Input, Picture, Report, Session, TransferFunction, View, ViewOptions, open_backend, read_input,
+};
+
+use crate::args::{RenderArgs, Technique, Transfer};
+use crate::progress::Progress;
+use crate::{Failure, say};
+
+pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    let backend = open_backend(args.backend.into())?;
+    let input = {
+        let _busy = Progress::spinner("reading");
+        read_input(&args.input, args.data.as_deref())?
+    };
+    let mut session = {
+        let _busy = Progress::spinner("building the pyramid");
+        let of_file = |error| Failure(format!("{}: {error}", input.path.display()));
+        Session::open(input.volume.grid.clone(), backend).map_err(of_file)?
+    };
+    let view = view(args, &input, &session)?;
+    let mut picture = {
+        let _busy = Progress::spinner("drawing");
+        match args.technique {
+            Technique::Auto | Technique::Raycast => session.render_frames(&view, args.frames as usize)?,
+        }
+    };
+    picture.report.input.path = Some(input.path.to_string_lossy().into_owned());
+    picture.report.seconds.load = Some(input.load_seconds);
+    write_image(&args.output, &picture.image)?;
+    let error_map = verify(args, &session, &view, &mut picture)?;
+    if let Some(path) = &args.report {
+        let json = picture.report.to_json();
+        write_atomically(path, |file| std::io::Write::write_all(file, json.as_bytes()))?;
+    }
+    say(summary(&args.output, &picture.report))?;
+    if let Some(line) = error_map {
+        say(line)?;
+    }
+    notes(&input, &session, &view)
+}
+
+fn view(args: &RenderArgs, input: &Input, session: &Session) -> Result<View, Failure> {
+    let transfer = args.transfer.as_ref().map(|transfer| load_transfer(transfer, session)).transpose()?;
+    let scene = input.scene.as_ref();
+    let defaults = ViewOptions::default();
+    let [width, height] =
+        args.size.or(scene.map(|scene| scene.size)).unwrap_or([defaults.width, defaults.height]);
+    let options = |direction: Direction, transfer| ViewOptions {
+        width,
+        height,
+        direction,
+        orthographic: args.orthographic,
+        transfer,
+    };
+    let mut view = match (scene, args.view) {
+        (None, direction) => session.view(&options(direction.unwrap_or_default(), transfer)),
+        (Some(scene), Some(direction)) => {
+            let transfer = transfer.unwrap_or_else(|| scene.transfer.clone());
+            let view = session.view(&options(direction, Some(transfer)));
+            View { background: scene.background, ..view }
+        }
+        (Some(scene), None) => View {
+            width,
+            height,
+            camera: if args.orthographic { fit::orthographic(&scene.camera) } else { scene.camera },
+            transfer: transfer.unwrap_or_else(|| scene.transfer.clone()),
+            background: scene.background,
+            tolerance: None,
+        },
+    };
+    view.tolerance = args.tolerance;
+    Ok(view)
+}
+
+fn load_transfer(transfer: &Transfer, session: &Session) -> Result<TransferFunction, Failure> {
+    match transfer {
+        Transfer::Preset(preset) => Ok(session.preset(*preset)),
+        Transfer::File(path) => {
+            let unit_distance = volery::transfer::unit_distance(session.grid().extent());
+            let range = Some(session.value_range());
+            Ok(read_transfer(path, &TransferOptions { map: None, range, unit_distance })?.transfer)
+        }
+    }
+}
+
+/// Measures the error where it was asked for; returns the line about the error map.
+fn verify(
+    args: &RenderArgs,
+    session: &Session,
+    view: &View,
+    picture: &mut Picture,
+) -> Result<Option<String>, Failure> {
+    if !args.verify && args.error_map.is_none() {
+        return Ok(None);
+    }
+    let truth = {
+        let bar = Progress::bar("computing the exact picture");
+        session.verify(view, picture, &|done| bar.set(done))?
+    };
+    let Some(path) = &args.error_map else { return Ok(None) };
+    let map = ErrorMap::new(&picture.image, &truth)?;
+    write_image(path, &map.image)?;
+    Ok(Some(format!("{}: |picture - reference| x {}", path.display(), map.gain)))
+}
+
+/// What a user wants to know about a picture, without the JSON.
+pub(crate) fn summary(output: &Path, report: &Report) -> String {
+    let seconds = &report.seconds;
+    let mut text = format!(
+        "{}: {}x{}, {}, {} ({})\n{:.1} ms a frame: select {:.1}, upload {:.1}, draw {:.1}; {} nodes, {} resident",
+        output.display(),
+        report.image.width,
+        report.image.height,
+        report.technique,
+        report.backend.kind,
+        report.backend.device,
+        1e3 * seconds.frame,
+        1e3 * seconds.select,
+        1e3 * seconds.upload,
+        1e3 * seconds.draw,
+        report.work.nodes,
+        megabytes(report.work.bytes_resident),
+    );
+    if let Some(error) = &report.error {
+        let rmse = error.measured_rmse;
+        text += &format!("\nerror: max {:.5}, rmse {rmse:.6} against {}", error.measured_max, error.against);
+    }
+    text
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+fn notes(input: &Input, session: &Session, view: &View) -> Result<(), Failure> {
+    for note in &input.volume.notes {
+        say(format_args!("note: {note}"))?;
+    }
+    let [low, high] = session.value_range();
+    if view.transfer.is_transparent(low, high) {
+        say(format_args!(
+            "note: the transfer function is transparent for all values of the file, {low} to {high}"
+        ))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,209 @@
+//! A mutational fuzzer over every reader: deterministic, without a nightly compiler.
+//!
+//! Valid files of each format are damaged at random (bits, truncation, splices, numbers in text, lengths in
+//! binary headers) and read. A case passes if the reader returns, in time, without a panic, allocating no
+//! more than a small multiple of the limit it was given; an error must be one line. `cargo test` runs each
+//! reader for a moment; `VOLERY_FUZZ_SECS=N` runs each for N seconds, `VOLERY_FUZZ_SEED` starts elsewhere.
+//! A failing input is written to the system's folder for temporary files and named in the failure.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(unsafe_code, reason = "a global allocator that counts is an unsafe trait")]
+
+#[path = "../readers/make.rs"]
+#[allow(dead_code, reason = "the readers' tests use more of it")]
+mod make;
+mod memory;
+mod mutate;
+mod seeds;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use volery_io::transfer::TransferOptions;
+use volery_io::{Element, ReadOptions, SceneFile, read_transfer, read_volume};
+
+use memory::peak_during;
+use mutate::Random;
+
+/// The limit given to the readers.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// What a case may allocate: doubling, the decoders' own state, the file itself.
+const MAX_ALLOCATED: usize = 24 << 20;
+
+/// Without a wish each family runs so many cases, the same each time.
+const DEFAULT_CASES: u64 = 12_000;
+
+fn read_case(path: &Path) -> Result<(), String> {
+    let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    let line = if name.ends_with("scene.json") {
+        SceneFile::read(path).err().map(|error| error.to_string())
+    } else if name.ends_with(".json") {
+        let options = TransferOptions { map: None, range: Some([0.0, 9.0]), unit_distance: 1.0 };
+        read_transfer(path, &options).err().map(|error| error.to_string())
+    } else {
+        let options = ReadOptions { max_bytes: MAX_BYTES, ..ReadOptions::default() };
+        match read_volume(path, &options) {
+            Err(error) => Some(error.to_string()),
+            Ok(volume) => {
+                // Touching every sample shows a view that does not fit.
+                let grid = &volume.grid;
+                let sum: f64 = (0..grid.num_samples()).map(|i| grid.samples().value(i, 0)).sum();
+                std::hint::black_box(sum);
+                assert!(grid.num_samples() * grid.sample_type().bytes() <= MAX_BYTES as usize);
+                None
+            }
+        }
+    };
+    match line {
+        Some(line) if line.contains('\n') || line.len() > 1000 => {
+            Err(format!("the error is no short line: {line}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Reads one damaged file; says what is wrong with how that went.
+fn check(path: &Path) -> Result<(), String> {
+    let start = Instant::now();
+    let (outcome, peak) = peak_during(|| catch_unwind(AssertUnwindSafe(|| read_case(path))));
+    outcome.map_err(|_| "it panicked".to_owned())??;
+    if peak > MAX_ALLOCATED {
+        return Err(format!("{peak} bytes were allocated, expected at most {MAX_ALLOCATED}"));
+    }
+    if start.elapsed() > Duration::from_secs(5) {
+        return Err(format!("it took {:?}", start.elapsed()));
+    }
+    Ok(())
+}
+
+/// A folder in memory where there is one: a busy disk takes milliseconds for each small file.
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap()
+}
+
+/// Fuzzes one family of files; `name` must be theirs to read.
+fn fuzz(name: &str, files: &[Vec<u8>]) {
+    let _alone = memory::alone();
+    let number = |variable: &str| std::env::var(variable).ok().and_then(|text| text.parse::<u64>().ok());
+    let seconds = number("VOLERY_FUZZ_SECS");
+    let seed = number("VOLERY_FUZZ_SEED").unwrap_or(1);
+    let folder = folder();
+    let path = folder.path().join(name);
+    let start = Instant::now();
+    for file in files {
+        std::fs::write(&path, file).unwrap();
+        check(&path).unwrap_or_else(|problem| panic!("{name}: an undamaged file: {problem}"));
+    }
+    let mut cases = 0;
+    let mut random = Random::new(seed);
+    while seconds.map_or(cases < DEFAULT_CASES, |seconds| start.elapsed().as_secs() < seconds) {
+        cases += 1;
+        let mut damaged = mutate::damage(files, &mut random);
+        if name.ends_with(".png") && cases % 4 > 0 {
+            mutate::repair_png(&mut damaged);
+        }
+        std::fs::write(&path, &damaged).unwrap();
+        if let Err(problem) = check(&path) {
+            let kept = std::env::temp_dir().join(format!("volery-fuzz-{seed}-{cases}-{name}"));
+            std::fs::write(&kept, &damaged).unwrap();
+            panic!("{name}, case {cases} of seed {seed}: {problem}; kept as {}", kept.display());
+        }
+    }
+    println!("{name}: {cases} cases in {:?}", start.elapsed());
+}
+
+macro_rules! families {
+    ($($test:ident: $name:literal, $files:expr;)*) => {$(
+        #[test]
+        fn $test() {
+            fuzz($name, &$files);
+        }
+    )*};
+}
+
+families! {
+    raw: "a_3x2x2_uint16be.raw", seeds::raw();
+    raw_gzip: "a_3x2x2_uint16be.raw.gz", seeds::raw_gzip();
+    raw_zstd: "a_3x2x2_uint16be.raw.zst", seeds::raw_zstd();
+    nifti: "a.nii", seeds::nifti();
+    nifti_gzip: "a.nii.gz", seeds::nifti_gzip();
+    nrrd: "a.nrrd", seeds::nrrd();
+    metaimage: "a.mha", seeds::metaimage();
+    vti: "a.vti", seeds::vti();
+    png: "a.png", seeds::png();
+    jpeg: "a.jpg", seeds::jpeg();
+    tiff: "a.tif", seeds::tiff();
+    scene: "scene.json", seeds::scene();
+    transfer: "map.json", seeds::transfer();
+}
+
+/// Files of a kilobyte that promise up to 60 GiB: refused without allocating for the promise.
+#[test]
+fn promises_of_sixty_gigabytes_allocate_nothing() {
+    use volery_scene::SampleType;
+    let _alone = memory::alone();
+    let folder = folder();
+    let zeros = make::gzip(&[0; 1000]);
+    let header =
+        make::Nifti { dim: vec![3, 4000, 4000, 4000], ..make::Nifti::new(SampleType::U8, make::ORDERS[0]) };
+    let nrrd = |encoding: &str, data: &[u8]| {
+        let text =
+            format!("NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4000 4000 4000\nencoding: {encoding}\n\n");
+        [text.as_bytes(), data].concat()
+    };
+    let mha =
+        make::mha_header(SampleType::U8, make::ORDERS[0], true, "LOCAL").replace("3 2 2", "4000 4000 4000");
+    let vti = |data, compressed| {
+        let vti = make::Vti { compressed, ..make::Vti::new(SampleType::U8, data) };
+        vti.file_of(&[1.0; 12], "0 3999 0 3999 0 3999", "PointData", "")
+    };
+    let mut files = vec![
+        ("a_4000x4000x4000_uint8.raw", vec![0; 1000]),
+        ("a_4000x4000x4000_uint8.raw.gz", zeros.clone()),
+        ("a_4000x4000x4000_uint8.raw.zst", make::zstd(&[0; 1000])),
+        ("a.nii", header.file(&[0; 1000])),
+        ("a.nii.gz", make::gzip(&header.file(&[0; 1000]))),
+        ("a.nrrd", nrrd("raw", &[0; 1000])),
+        ("a.nrrd", nrrd("gzip", &zeros)),
+        ("a.mha", [mha.as_bytes(), &make::zlib(&[0; 1000])].concat()),
+    ];
+    for data in make::VTI_DATA {
+        files.extend([("a.vti", vti(data, false)), ("a.vti", vti(data, true))]);
+    }
+    for (name, file) in files {
+        let path = folder.path().join(name);
+        std::fs::write(&path, file).unwrap();
+        let (result, peak) = peak_during(|| read_volume(&path, &ReadOptions::default()));
+        println!("{name}: {peak} bytes allocated at most, {}", result.as_ref().unwrap_err());
+        assert!(peak < 2 << 20, "{name}: {peak} bytes");
+    }
+}
+
+/// A gzip bomb: 1 GiB of zeros in 1 MiB. What comes counts, so it stops at the first byte too many.
+#[test]
+fn bombs_stop_at_the_expected_size_and_at_the_limit() {
+    use std::io::Write;
+    let _alone = memory::alone();
+    let folder = folder();
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    for _ in 0..1024 {
+        encoder.write_all(&[0; 1 << 20]).unwrap();
+    }
+    let path = folder.path().join("bomb_64x64x64_uint8.raw.gz");
+    std::fs::write(&path, encoder.finish().unwrap()).unwrap();
+    let (result, peak) = peak_during(|| read_volume(&path, &ReadOptions::default()));
+    assert!(result.unwrap_err().to_string().ends_with("the gzip stream holds 262145 bytes, expected 262144"));
+    assert!(peak < 2 << 20, "{peak} bytes");
+    let element: Element = "uint8".parse().unwrap();
+    let options = ReadOptions {
+        dims: Some([1024, 1024, 1024]),
+        element: Some(element),
+        max_bytes: 1 << 24,
+        ..Default::default()
+    };
+    let (result, peak) = peak_during(|| read_volume(&path, &options));
+    let line = result.unwrap_err().to_string();
+    assert!(line.ends_with("the volume needs 1073741824 bytes, expected at most 16777216"), "{line}");
+    assert!(peak < 1 << 20, "{peak} bytes");
+}

@@ -1,0 +1,165 @@
+//! The undamaged files.
+
+use std::io::Cursor;
+
+use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, colortype};
+use volery_io::ByteOrder::{Big, Little};
+use volery_scene::SampleType;
+
+use crate::make::{self, Nifti, VTI_DATA, Vti};
+
+fn big() -> Vec<u8> {
+    make::payload(SampleType::U16, Big)
+}
+
+pub(crate) fn raw() -> Vec<Vec<u8>> {
+    vec![big()]
+}
+
+pub(crate) fn raw_gzip() -> Vec<Vec<u8>> {
+    vec![make::gzip(&big()), [make::gzip(&big()[..5]), make::gzip(&big()[5..])].concat()]
+}
+
+pub(crate) fn raw_zstd() -> Vec<Vec<u8>> {
+    vec![make::zstd(&big()), zstd::bulk::compress(&big(), 19).unwrap(), make::zstd(&[7; 24])]
+}
+
+pub(crate) fn nifti() -> Vec<Vec<u8>> {
+    let scaled = Nifti { scaling: [2.0, 1.0], ..Nifti::new(SampleType::U8, Little) };
+    let series = Nifti { dim: vec![4, 3, 2, 2, 2], ..Nifti::new(SampleType::U8, Little) };
+    vec![Nifti::new(SampleType::U16, Big).file(&big()), scaled.file(&[5; 12]), series.file(&[5; 24])]
+}
+
+pub(crate) fn nifti_gzip() -> Vec<Vec<u8>> {
+    // Stored blocks, so that changes reach the header.
+    nifti().into_iter().flat_map(|file| [make::gzip(&file), stored(&file)]).collect()
+}
+
+fn stored(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::none());
+    std::io::Write::write_all(&mut encoder, bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+pub(crate) fn nrrd() -> Vec<Vec<u8>> {
+    let colours = b"NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 2 1 2\nkinds: vector space space space\n\
+        space directions: none (1,0,0) (0,1,0) (0,0,1)\nbyte skip: -1\nencoding: raw\n\n123456789abc";
+    let big = big();
+    let raw = make::nrrd(SampleType::U16, Big, "raw", &big);
+    vec![raw, make::nrrd(SampleType::U16, Big, "gzip", &make::gzip(&big)), colours.to_vec()]
+}
+
+pub(crate) fn metaimage() -> Vec<Vec<u8>> {
+    let colours =
+        b"NDims = 2\nDimSize = 2 2\nElementType = MET_UCHAR\nElementNumberOfChannels = 3\nHeaderSize = 0\n\
+        ElementSize = 1 2\nElementDataFile = LOCAL\n123456789abc";
+    let big = big();
+    let packed = make::mha(SampleType::U16, Big, true, &make::zlib(&big));
+    vec![make::mha(SampleType::U16, Big, false, &big), packed, colours.to_vec()]
+}
+
+pub(crate) fn vti() -> Vec<Vec<u8>> {
+    let mut files = Vec::new();
+    for data in VTI_DATA {
+        for compressed in [false, true] {
+            let vti = Vti { sample: SampleType::U16, order: Big, data, compressed, wide: compressed };
+            files.push(vti.file());
+            let vti = Vti { compressed, ..Vti::new(SampleType::U8, data) };
+            files.push(vti.file_of(&[9.0; 12], "0 2 0 2 0 1", "CellData", "NumberOfComponents=\"3\""));
+        }
+    }
+    files
+}
+
+pub(crate) fn png() -> Vec<Vec<u8>> {
+    use png::{BitDepth::*, ColorType::*};
+    let mut files = Vec::new();
+    for (color, depth, bytes) in [
+        (Grayscale, One, 1),
+        (Grayscale, Eight, 5),
+        (Grayscale, Sixteen, 10),
+        (Rgb, Eight, 15),
+        (Rgb, Sixteen, 30),
+        (Rgba, Eight, 20),
+        (GrayscaleAlpha, Eight, 10),
+        (Indexed, Four, 3),
+    ] {
+        let mut file = Vec::new();
+        let mut encoder = png::Encoder::new(&mut file, 5, 4);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        if color == Indexed {
+            encoder.set_palette((0..48).collect::<Vec<u8>>());
+            encoder.set_trns(vec![1, 2, 3]);
+        }
+        let data: Vec<u8> = (0..bytes * 4).map(|i| (i * 37) as u8).collect();
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&data).unwrap();
+        writer.finish().unwrap();
+        files.push(file);
+    }
+    files
+}
+
+pub(crate) fn jpeg() -> Vec<Vec<u8>> {
+    let mut files = Vec::new();
+    for (width, height) in [(1, 1), (17, 9), (40, 33)] {
+        let mut file = Cursor::new(Vec::new());
+        let image = image::GrayImage::from_fn(width, height, |x, y| image::Luma([(x * 31 + y * 17) as u8]));
+        image.write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
+        files.push(file.into_inner());
+        let mut file = Cursor::new(Vec::new());
+        let image =
+            image::RgbImage::from_fn(width, height, |x, y| image::Rgb([(x * 31) as u8, (y * 17) as u8, 90]));
+        image.write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
+        files.push(file.into_inner());
+    }
+    files
+}
+
+pub(crate) fn tiff() -> Vec<Vec<u8>> {
+    let mut files = Vec::new();
+    for compression in [
+        Compression::Uncompressed,
+        Compression::Lzw,
+        Compression::Deflate(DeflateLevel::Fast),
+        Compression::Packbits,
+    ] {
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).unwrap().with_compression(compression);
+        encoder.write_image::<colortype::Gray16>(3, 2, &[1, 2, 3, 4, 5, 60_000]).unwrap();
+        encoder.write_image::<colortype::Gray16>(3, 2, &[6, 7, 8, 9, 10, 11]).unwrap();
+        files.push(file.into_inner());
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).unwrap().with_compression(compression);
+        encoder.write_image::<colortype::RGB8>(2, 2, &[7; 12]).unwrap();
+        files.push(file.into_inner());
+    }
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new_big(&mut file).unwrap();
+    encoder.write_image::<colortype::Gray32Float>(2, 1, &[0.5, 1.5]).unwrap();
+    files.push(file.into_inner());
+    files
+}
+
+pub(crate) fn scene() -> Vec<Vec<u8>> {
+    let text = br#"{"name": "tooth", "input": {"kind": "volume", "file": "tooth.raw", "dims": [103, 94, 161],
+        "dtype": ">u2", "spacing": [1, 1, 2.5]}, "size": [512, 256], "background": [0, 0.5, 1],
+        "camera": {"projection": "perspective", "eye": [240, -150, 180], "target": [51, 46.5, 80], "up": [0, 0, 1],
+        "fov_y_deg": 30}, "transfer_function": {"points": [{"value": 0, "color": [0, 0, 0], "opacity": 0}],
+        "unit_distance": 1.0}}"#;
+    vec![text.to_vec()]
+}
+
+pub(crate) fn transfer() -> Vec<Vec<u8>> {
+    let ours = br#"{"points": [{"value": 1, "color": [0, 0.5, 1], "opacity": 0}], "unit_distance": 2.5}"#;
+    let mut files = vec![ours.to_vec()];
+    for space in ["RGB", "HSV", "Lab", "Diverging", "Step"] {
+        let text = format!(
+            r#"[{{"Name": "A", "ColorSpace": "{space}", "RGBPoints": [0, 0.1, 0.2, 0.3, 2, 1, 0, 0.5, 3, 0, 0, 0,],
+            "Points": [0, 0, 0.5, 0, 1, 0.2, 0.3, 0.6, 2, 0.9, 0.5, 1, 3, 1, 0.5, 0]}}]"#
+        );
+        files.push(text.into_bytes());
+    }
+    files
+}

@@ -1,0 +1,106 @@
+//! The filters: data tolerance, view frustum, transparency.
+
+use glam::DVec3;
+use volery_pyramid::{Layout, Node, NodeSource};
+use volery_scene::{Camera, Projection, TransferFunction};
+
+use crate::select::{Answer, Filter};
+
+/// Draws a node whose data error is below a tolerance, else descends.
+///
+/// *Strictly* below: tolerance 0 gives the finest level everywhere, and an infinite error (blank samples)
+/// is below no tolerance. Level 0 is always drawn. Of several channels the worst counts.
+pub struct DataTolerance<'a> {
+    /// Where the errors come from.
+    pub source: &'a dyn NodeSource,
+    /// In data units.
+    pub tolerance: f64,
+}
+
+impl Filter for DataTolerance<'_> {
+    fn answer(&mut self, node: Node) -> Answer {
+        let good = node.level == 0 || self.source.stats(node).iter().all(|s| s.error < self.tolerance);
+        if good { Answer::Draw } else { Answer::Descend }
+    }
+}
+
+/// Skips a node in which the finest field is perfectly transparent, by the exact range of its samples.
+///
+/// A wholly blank node is skipped too. A transfer function speaks of scalars: nodes of colour volumes are
+/// never skipped.
+pub struct Transparency<'a> {
+    /// Where the ranges come from.
+    pub source: &'a dyn NodeSource,
+    /// What makes them transparent.
+    pub transfer: &'a TransferFunction,
+}
+
+impl Filter for Transparency<'_> {
+    fn answer(&mut self, node: Node) -> Answer {
+        match self.source.stats(node) {
+            [scalar] if self.transfer.is_transparent(scalar.min, scalar.max) => Answer::Skip,
+            _ => Answer::Draw,
+        }
+    }
+}
+
+/// Skips a node that no ray of the picture meets.
+///
+/// The rays of a picture fill the intersection of five half spaces: before the eye, and inside each edge
+/// of the picture. A node is skipped when one of them does not hold any of its corners, by more than
+/// rounding can be wrong; so a node near an edge of that region may stay though no ray meets it.
+pub struct Frustum<'a> {
+    layout: &'a Layout,
+    /// Points on the boundary planes, and their normals of unit length, pointing inwards.
+    planes: [(DVec3, DVec3); 5],
+    /// World distance below which a corner counts as inside.
+    slack: f64,
+}
+
+impl<'a> Frustum<'a> {
+    /// The frustum of a picture of `width` by `height` pixels. A camera with
+    /// [defects](Camera::defects) skips nothing.
+    pub fn new(layout: &'a Layout, camera: &Camera, width: u32, height: u32) -> Self {
+        let rays = camera.rays(width, height);
+        let [right, up, forward] = camera.axes();
+        let (width, height) = (f64::from(width), f64::from(height));
+        let sides = match camera.projection {
+            Projection::Perspective { .. } => {
+                let corner = |x: f64, y: f64| {
+                    rays.toward + rays.toward_dx * (x * width) + rays.toward_dy * (y * height)
+                };
+                let (left, right) = (corner(0.0, 0.5), corner(1.0, 0.5));
+                let (top, bottom) = (corner(0.5, 0.0), corner(0.5, 1.0));
+                let across = rays.toward_dx;
+                let down = rays.toward_dy;
+                [left.cross(down), down.cross(right), across.cross(top), bottom.cross(across)]
+                    .map(|normal| (camera.eye, normal.normalize()))
+            }
+            Projection::Orthographic { .. } => {
+                let last = rays.origin + rays.origin_dx * width + rays.origin_dy * height;
+                [(rays.origin, right), (last, -right), (rays.origin, -up), (last, up)]
+            }
+        };
+        let [a, b, c, d] = sides.map(|(point, normal)| {
+            // Whichever way the cross products turn, the middle of the picture is inside.
+            let middle = rays.ray(width / 2.0, height / 2.0);
+            let inside = (middle.origin + middle.direction - point).dot(normal);
+            (point, normal * inside.signum())
+        });
+        let reach = layout.world_bounds(layout.root())[1].length() + camera.eye.length();
+        // Positions, axes and dot products are each wrong by a few units of 2^-53 of the reach.
+        Self { layout, planes: [(camera.eye, forward), a, b, c, d], slack: 1e-12 * reach }
+    }
+}
+
+impl Filter for Frustum<'_> {
+    fn answer(&mut self, node: Node) -> Answer {
+        let [low, high] = self.layout.world_bounds(node);
+        let outside = self.planes.iter().any(|&(point, normal)| {
+            // The corner that lies deepest inside.
+            let deepest = DVec3::select(normal.cmpgt(DVec3::ZERO), high, low);
+            (deepest - point).dot(normal) < -self.slack
+        });
+        if outside { Answer::Skip } else { Answer::Draw }
+    }
+}

@@ -1,0 +1,5 @@
+//! The pyramid against slow oracles.
+
+mod bricks;
+mod oracle;
+mod statistics;

@@ -1,0 +1,50 @@
+//! Which backend draws.
+//!
+//! `Auto` takes a real GPU; without one it takes the software executor, also where a CPU device pretends to
+//! be a GPU: on two cores Mesa's llvmpipe took several times as long for the same picture (`cargo xtask bench
+//! peers` prints both), and both use the same cores.
+
+use std::path::Path;
+
+use volery_frame::{Backend, DeviceKind};
+use volery_software::SoftwareBackend;
+use volery_wgpu::WgpuBackend;
+
+/// Who shall draw.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BackendChoice {
+    /// A real GPU, else the software executor.
+    #[default]
+    Auto,
+    /// The software executor.
+    Software,
+    /// The best device that wgpu finds, a CPU that pretends to be a GPU too.
+    Wgpu,
+}
+
+/// Why a backend could not be had.
+#[derive(Debug, thiserror::Error)]
+#[error("backend wgpu: {0}")]
+pub struct BackendError(#[from] volery_wgpu::OpenError);
+
+/// Opens a backend.
+///
+/// # Errors
+/// When wgpu was asked for and has no device; the other choices always succeed.
+pub fn open_backend(choice: BackendChoice) -> Result<Box<dyn Backend>, BackendError> {
+    match choice {
+        BackendChoice::Software => Ok(Box::new(SoftwareBackend::new())),
+        BackendChoice::Wgpu => Ok(Box::new(WgpuBackend::new()?)),
+        BackendChoice::Auto => Ok(match may_have_gpu().then(|| WgpuBackend::of_kind(DeviceKind::Gpu)) {
+            Some(Ok(gpu)) => Box::new(gpu),
+            _ => Box::new(SoftwareBackend::new()),
+        }),
+    }
+}
+
+/// Whether it is worth looking for a GPU. On Linux each kind of driver has a file of its own; without any of
+/// them, loading Vulkan to find nothing takes longer than a small picture.
+fn may_have_gpu() -> bool {
+    const DRIVER_FILES: [&str; 5] = ["/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/kgsl-3d0", "/dev/mali0"];
+    !cfg!(target_os = "linux") || DRIVER_FILES.iter().any(|file| Path::new(file).exists())
+}

@@ -1,0 +1,241 @@
+//! A camera that shows what there is to see.
+//!
+//! # Method
+//! Every sample of a level of at most [`MAX_SAMPLES`] weighs as much as its opacity. The domain is divided
+//! into blocks, at most [`MAX_BLOCKS`] along an axis, and the lightest blocks are left out as long as they hold
+//! no more than [`TRIM`] of all weight together, so that specks of noise do not push the camera away. The camera
+//! then stands as near as it can with every corner of the other blocks in the picture, and in its middle.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use volery_pyramid::{NodeSource, Pyramid};
+use volery_scene::{Camera, Projection, TransferFunction};
+
+/// Samples looked at, at most.
+pub const MAX_SAMPLES: usize = 1 << 21;
+
+/// Blocks along an axis, at most.
+pub const MAX_BLOCKS: usize = 32;
+
+/// Share of opacity that may lie outside all blocks.
+pub const TRIM: f64 = 0.002;
+
+/// Part of the picture's width or height that the blocks fill.
+const FILL: f64 = 0.92;
+
+/// Full vertical angle of view of a fitted camera.
+const FOV_Y_DEG: f64 = 30.0;
+
+/// How often the picture is moved to its middle; each time leaves less than a quarter of what was off.
+const NUM_CENTERINGS: usize = 6;
+
+/// From where to look at a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction {
+    /// About z: 0 looks along +y, positive turns the eye towards +x.
+    pub azimuth_deg: f64,
+    /// Above the xy plane.
+    pub elevation_deg: f64,
+    /// Above 1 comes nearer.
+    pub zoom: f64,
+}
+
+impl Default for Direction {
+    /// From the right, a little from above.
+    fn default() -> Self {
+        Self { azimuth_deg: 35.0, elevation_deg: 22.0, zoom: 1.0 }
+    }
+}
+
+/// Boxes in world units, `[low, high]`, that hold the visible matter; the whole domain if nothing is visible.
+pub fn visible_blocks(pyramid: &Pyramid, transfer: &TransferFunction) -> Vec<[DVec3; 2]> {
+    let layout = pyramid.layout();
+    let small = |&level: &u32| layout.level_dims(level).iter().product::<usize>() <= MAX_SAMPLES;
+    let level = (0..layout.num_levels()).find(small).unwrap_or(layout.num_levels() - 1);
+    let dims = layout.level_dims(level);
+    // Cells of the level per block; its samples and those of the next block's lower face count.
+    let cells = dims.map(|n| (n - 1).div_ceil(MAX_BLOCKS).max(1));
+    let num_blocks: [usize; 3] = std::array::from_fn(|axis| (dims[axis] - 1).div_ceil(cells[axis]).max(1));
+    let samples = pyramid.level(level);
+    let weigh = |block: usize| {
+        let place = [
+            block % num_blocks[0],
+            block / num_blocks[0] % num_blocks[1],
+            block / num_blocks[0] / num_blocks[1],
+        ];
+        let first: [usize; 3] = std::array::from_fn(|axis| place[axis] * cells[axis]);
+        let last: [usize; 3] = std::array::from_fn(|axis| (first[axis] + cells[axis]).min(dims[axis] - 1));
+        let mut weight = 0.0;
+        for z in first[2]..=last[2] {
+            for y in first[1]..=last[1] {
+                let row = (z * dims[1] + y) * dims[0];
+                let opacity = |x: usize| {
+                    let value = samples.value(row + x, 0);
+                    if value.is_finite() { transfer.classify(value).1 } else { 0.0 }
+                };
+                weight += (first[0]..=last[0]).map(opacity).sum::<f64>();
+            }
+        }
+        let step = layout.spacing() * (1_u64 << level) as f64;
+        let corner = |place: [usize; 3]| DVec3::from_array(place.map(|i| i as f64)) * step;
+        let end = layout.domain() * layout.spacing();
+        (weight, [corner(first), corner(last).min(end)])
+    };
+    let mut blocks: Vec<(f64, [DVec3; 2])> =
+        (0..num_blocks.iter().product()).into_par_iter().map(weigh).collect();
+    blocks.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = blocks.iter().map(|(weight, _)| weight).sum();
+    let mut sum = 0.0;
+    let light = blocks.iter().take_while(|(weight, _)| {
+        sum += weight;
+        sum <= all * TRIM
+    });
+    let num_light = light.count();
+    if num_light == blocks.len() {
+        return vec![[DVec3::ZERO, layout.domain() * layout.spacing()]];
+    }
+    blocks[num_light..].iter().map(|&(_, block)| block).collect()
+}
+
+/// The camera that shows boxes of positive size from a direction, in a picture `aspect` times as wide as high.
+/// Without defects for finite arguments and a positive zoom.
+pub fn camera(boxes: &[[DVec3; 2]], direction: Direction, orthographic: bool, aspect: f64) -> Camera {
+    let [low, high] = boxes.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], block| {
+        [low.min(block[0]), high.max(block[1])]
+    });
+    let Direction { azimuth_deg, elevation_deg, zoom } = direction;
+    // For the axes alone: eye and target are set below.
+    let turned = Camera::fitted(high - low, azimuth_deg, elevation_deg, 1.0, false);
+    let [right, up, forward] = turned.axes();
+    let corners: Vec<DVec3> = boxes
+        .iter()
+        .flat_map(|block| {
+            let pick = |corner: usize, axis: usize| block[corner >> axis & 1][axis];
+            (0..8).map(move |corner| DVec3::new(pick(corner, 0), pick(corner, 1), pick(corner, 2)))
+        })
+        .map(|corner| DVec3::new(corner.dot(right), corner.dot(up), corner.dot(forward)))
+        .collect();
+    // From here on in the axes of the picture. `slope` is half the picture's height at distance 1, as far as
+    // it may be filled.
+    let slope = (FOV_Y_DEG / 2.0).to_radians().tan() * FILL;
+    let middle = (low + high) / 2.0;
+    let mut target = DVec3::new(middle.dot(right), middle.dot(up), middle.dot(forward));
+    let (mut distance, mut half_height) = (0.0, 0.0);
+    for _ in 0..NUM_CENTERINGS {
+        (distance, half_height) = (0.0_f64, 0.0_f64);
+        for &corner in &corners {
+            let from_target = corner - target;
+            let across = from_target.y.abs().max(from_target.x.abs() / aspect);
+            distance = distance.max(across / slope - from_target.z);
+            half_height = half_height.max(across / FILL);
+        }
+        let [first, last] =
+            corners.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[first, last], &corner| {
+                let from_target = corner - target;
+                let depth = if orthographic { 1.0 } else { (from_target.z + distance) / distance };
+                [first.min(from_target / depth), last.max(from_target / depth)]
+            });
+        let off = (first + last) / 2.0;
+        target += DVec3::new(off.x, off.y, 0.0);
+    }
+    let target = right * target.x + up * target.y + forward * target.z;
+    let projection = if orthographic {
+        Projection::Orthographic { height: 2.0 * half_height / zoom }
+    } else {
+        Projection::Perspective { fov_y_deg: FOV_Y_DEG }
+    };
+    // Parallel rays start before the boxes, whatever the zoom.
+    let distance = if orthographic { distance.max((high - low).length()) } else { distance / zoom };
+    Camera { eye: target - forward * distance, target, up: turned.up, projection }
+}
+
+/// A camera of parallel rays that shows the plane through the target as large as `camera` does.
+pub fn orthographic(camera: &Camera) -> Camera {
+    let height = match camera.projection {
+        Projection::Orthographic { height } => height,
+        Projection::Perspective { fov_y_deg } => {
+            2.0 * (camera.target - camera.eye).length() * (fov_y_deg.to_radians() / 2.0).tan()
+        }
+    };
+    Camera { projection: Projection::Orthographic { height }, ..*camera }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use volery_pyramid::Kind;
+    use volery_scene::{ControlPoint, VoxelGrid};
+
+    fn corners_fill_the_picture(bounds: [DVec3; 2], camera: &Camera, aspect: f64) -> f64 {
+        let [right, up, forward] = camera.axes();
+        let mut largest = 0.0_f64;
+        for corner in 0..8u32 {
+            let pick = |axis: usize| bounds[(corner >> axis & 1) as usize][axis];
+            let p = DVec3::new(pick(0), pick(1), pick(2)) - camera.eye;
+            let half = match camera.projection {
+                Projection::Perspective { fov_y_deg } => {
+                    assert!(p.dot(forward) > 0.0, "a corner lies behind the eye");
+                    (fov_y_deg / 2.0).to_radians().tan() * p.dot(forward)
+                }
+                Projection::Orthographic { height } => height / 2.0,
+            };
+            largest = largest.max(p.dot(up).abs() / half).max(p.dot(right).abs() / (half * aspect));
+        }
+        largest
+    }
+
+    #[test]
+    fn the_box_just_fits_from_everywhere() {
+        let bounds = [DVec3::new(5.0, -3.0, 1.0), DVec3::new(9.0, 40.0, 2.0)];
+        for (azimuth_deg, elevation_deg) in [(35.0, 22.0), (0.0, 90.0), (200.0, -90.0), (90.0, 0.0)] {
+            for aspect in [1.0, 2.5, 0.3] {
+                for parallel in [false, true] {
+                    let direction = Direction { azimuth_deg, elevation_deg, zoom: 1.0 };
+                    let camera = camera(&[bounds], direction, parallel, aspect);
+                    assert!(camera.defects().is_empty());
+                    let filled = corners_fill_the_picture(bounds, &camera, aspect);
+                    assert!(
+                        filled > FILL - 0.1 && filled < 0.98,
+                        "{azimuth_deg} {aspect} {parallel}: {filled}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_visible_blocks_hold_the_matter_and_not_the_air() {
+        let mut values = vec![0u8; 40 * 30 * 20];
+        for z in 8..12 {
+            for y in 10..25 {
+                for x in 3..6 {
+                    values[(z * 30 + y) * 40 + x] = 100;
+                }
+            }
+        }
+        let grid = VoxelGrid::new([40, 30, 20], DVec3::new(1.0, 1.0, 2.0), values).unwrap();
+        let pyramid = Pyramid::build(&grid, Kind::Decimated, 8).unwrap();
+        let point = |value, opacity| ControlPoint { value, color: [1.0; 3], opacity };
+        let transfer = TransferFunction::new(vec![point(50.0, 0.0), point(100.0, 0.5)], 1.0).unwrap();
+        let blocks = visible_blocks(&pyramid, &transfer);
+        let [low, high] = blocks.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], block| {
+            [low.min(block[0]), high.max(block[1])]
+        });
+        let (first, last) = (DVec3::new(3.0, 10.0, 16.0), DVec3::new(5.0, 24.0, 22.0));
+        assert!(low.cmple(first).all() && high.cmpge(last).all(), "{low} {high}");
+        assert!((first - low).max_element() <= 4.0 && (high - last).max_element() <= 4.0, "{low} {high}");
+        let clear = TransferFunction::new(vec![point(0.0, 0.0)], 1.0).unwrap();
+        assert_eq!(visible_blocks(&pyramid, &clear), [[DVec3::ZERO, grid.extent()]]);
+    }
+
+    #[test]
+    fn an_orthographic_twin_is_as_large_at_the_target() {
+        let bounds = [DVec3::ZERO, DVec3::ONE];
+        let perspective = camera(&[bounds], Direction::default(), false, 1.0);
+        let Projection::Orthographic { height } = orthographic(&perspective).projection else {
+            panic!("not orthographic");
+        };
+        let distance = perspective.eye.distance(perspective.target);
+        assert!((height - 2.0 * distance * 15f64.to_radians().tan()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,119 @@
+//! What a file is, without drawing it.
+
+use std::fmt;
+
+use serde::Serialize;
+use volery_io::Volume;
+
+use crate::histogram::Histogram;
+
+/// Bins of the histogram in [`Info`].
+pub const NUM_BINS: usize = 32;
+
+/// What a volume or image file holds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Info {
+    /// `volume`, or `image` for one slice.
+    pub kind: &'static str,
+    /// Name of the format.
+    pub format: String,
+    /// Samples along x, y, z.
+    pub dims: [usize; 3],
+    /// Type of a sample: `u8`, `f32`, `rgb8`, ...
+    pub scalar: &'static str,
+    /// World distance of neighbouring samples along x, y, z.
+    pub spacing: [f64; 3],
+    /// World position of the last sample; the first is at the origin.
+    pub extent: [f64; 3],
+    /// Name of the array that was read, where the format names arrays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub array: Option<String>,
+    /// One, or three or four for colours.
+    pub channels: Vec<Channel>,
+    /// What the reader decided, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// The values of one channel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Channel {
+    /// Smallest and largest finite value; missing if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range: Option<[f64; 2]>,
+    /// Samples that are NaN or infinite.
+    pub blank: u64,
+    /// Samples by value, in bins of equal width over the range; missing if there is no range.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub histogram: Option<Vec<u64>>,
+}
+
+impl Info {
+    /// Looks at every sample of a volume.
+    pub fn of(volume: &Volume) -> Self {
+        let grid = &volume.grid;
+        let channels = (0..grid.sample_type().channels()).map(|channel| {
+            let histogram = Histogram::of(grid, channel);
+            let range = grid.value_range(channel);
+            let blank = match (&histogram, range) {
+                (Some(histogram), _) => histogram.blank,
+                (None, None) => grid.num_samples() as u64,
+                // A range too wide for bins.
+                (None, Some(_)) => {
+                    let blank = |&index: &usize| !grid.samples().value(index, channel).is_finite();
+                    (0..grid.num_samples()).filter(blank).count() as u64
+                }
+            };
+            Channel { range, blank, histogram: histogram.map(|histogram| histogram.coarse_counts(NUM_BINS)) }
+        });
+        Self {
+            kind: if grid.dims()[2] == 1 { "image" } else { "volume" },
+            format: volume.format.to_string(),
+            dims: grid.dims(),
+            scalar: grid.sample_type().name(),
+            spacing: grid.spacing().to_array(),
+            extent: grid.extent().to_array(),
+            array: volume.array.clone(),
+            channels: channels.collect(),
+            notes: volume.notes.clone(),
+        }
+    }
+}
+
+/// A few lines for people, the histogram as bars on a logarithmic scale.
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let times = |values: &[f64; 3]| values.map(|value| value.to_string()).join(" x ");
+        writeln!(f, "kind      {}, {}", self.kind, self.format)?;
+        writeln!(f, "dims      {}", self.dims.map(|n| n.to_string()).join(" x "))?;
+        writeln!(f, "type      {}", self.scalar)?;
+        writeln!(f, "spacing   {}", times(&self.spacing))?;
+        writeln!(f, "extent    {}", times(&self.extent))?;
+        if let Some(array) = &self.array {
+            writeln!(f, "array     {}", array.escape_debug())?;
+        }
+        for (number, channel) in self.channels.iter().enumerate() {
+            if self.channels.len() > 1 {
+                writeln!(f, "channel   {number}")?;
+            }
+            match channel.range {
+                Some([low, high]) => writeln!(f, "range     {low} to {high}")?,
+                None => writeln!(f, "range     none, every sample is blank")?,
+            }
+            if channel.blank > 0 {
+                writeln!(f, "blank     {} samples", channel.blank)?;
+            }
+            if let Some(histogram) = &channel.histogram {
+                writeln!(f, "histogram {}", bars(histogram))?;
+            }
+        }
+        self.notes.iter().try_for_each(|note| writeln!(f, "note      {note}"))
+    }
+}
+
+/// One character per bin: a blank for none, else one of eight heights, logarithmic.
+fn bars(counts: &[u64]) -> String {
+    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let top = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let height = |count: u64| (7.0 * (count as f64).ln_1p() / top.ln_1p()).round() as usize;
+    counts.iter().map(|&count| if count == 0 { ' ' } else { BARS[height(count)] }).collect()
+}

@@ -1,0 +1,136 @@
+//! What a picture was made from, how long it took, and how far it is from the truth: one JSON object.
+//!
+//! A field that is missing does not apply or is not known; it is never zero for unknown.
+
+use serde::Serialize;
+
+/// Everything about one picture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// What was drawn.
+    pub input: Input,
+    /// How: `raycast`.
+    pub technique: &'static str,
+    /// By whom.
+    pub backend: Backend,
+    /// Size of the picture.
+    pub image: ImageSize,
+    /// Where the time went.
+    pub seconds: Seconds,
+    /// Every frame, in order.
+    pub frames: Vec<Frame>,
+    /// How much there was to do.
+    pub work: Work,
+    /// What the picture was asked to cost or to be allowed to miss.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dial: Option<Dial>,
+    /// How far the picture is from the truth, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<Error>,
+}
+
+/// What was drawn.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Input {
+    /// The file; missing for a volume from memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
+    /// `volume`.
+    pub kind: &'static str,
+    /// Samples along x, y, z.
+    pub dims: [usize; 3],
+    /// Type of a sample: `u8`, `f32`, ...
+    pub scalar: &'static str,
+}
+
+/// Who drew.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Backend {
+    /// `software` or `wgpu`.
+    pub kind: &'static str,
+    /// Name of the device.
+    pub device: String,
+}
+
+/// Size of a picture in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct ImageSize {
+    /// From left to right.
+    pub width: u32,
+    /// From top to bottom.
+    pub height: u32,
+}
+
+/// Where the time went. `select`, `upload` and `draw` are those of the frame that `frame` is of: the median
+/// one (of an even number the faster of the two in the middle).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// Reading and decoding the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load: Option<f64>,
+    /// Building the pyramid.
+    pub build: f64,
+    /// Choosing and ordering the nodes, and integrating the transfer function.
+    pub select: f64,
+    /// Making bricks resident, reading them included.
+    pub upload: f64,
+    /// Drawing and reading the picture back.
+    pub draw: f64,
+    /// What a user waits for per picture once data are loaded: select, upload, draw.
+    pub frame: f64,
+}
+
+/// One frame of several.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Frame {
+    /// All of it.
+    pub seconds: f64,
+}
+
+/// How much there was to do.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Work {
+    /// Nodes drawn.
+    pub nodes: usize,
+    /// Nodes drawn of each level, the finest first.
+    pub nodes_by_level: Vec<usize>,
+    /// Bricks that became resident for these frames.
+    pub bricks: usize,
+    /// What the backend holds after the last frame.
+    pub bytes_resident: u64,
+    /// Texels sent to the backend for these frames.
+    pub bytes_uploaded: u64,
+}
+
+/// The dial that was turned.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Dial {
+    /// Largest difference of a value from the full resolution, as a fraction of the file's value range.
+    pub tolerance: f64,
+}
+
+/// Distance from the truth, of colour channels in [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Error {
+    /// Largest difference of any channel of any pixel.
+    pub measured_max: f64,
+    /// Root of the mean squared difference over all channels of all pixels.
+    pub measured_rmse: f64,
+    /// The same in decibels; missing where pictures are equal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_psnr_db: Option<f64>,
+    /// What the truth was.
+    pub against: &'static str,
+}
+
+impl Report {
+    /// The report as the JSON text that `--report` writes.
+    ///
+    /// # Panics
+    /// Never: there is nothing in a report that JSON cannot hold.
+    pub fn to_json(&self) -> String {
+        let mut text = serde_json::to_string_pretty(self).expect("plain data without maps");
+        text.push('\n');
+        text
+    }
+}

@@ -1,0 +1,135 @@
+//! Samples of any type as the texels that backends hold.
+//!
+//! | samples | texels | rounding |
+//! |---|---|---|
+//! | u8, i8 | U8 | none |
+//! | u16, i16 | U16 | none |
+//! | u32, i32, f32, f64 | F32, 0 at the smallest finite value and 1 at the largest | at most 2^-25 of the range |
+//!
+//! Relative to the range, since `f32` texels near 1e6 would leave nothing of a range of 1. A sample that is
+//! blank (NaN or infinite) becomes NaN.
+
+use volery_frame::{TexelType, Texels};
+use volery_pyramid::{BrickSamples, for_brick_samples};
+use volery_scene::{Sample, SampleType};
+
+/// How samples of one volume become texels: `value = offset + scale * texel`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Encoding {
+    pub(crate) texel: TexelType,
+    pub(crate) scale: f64,
+    pub(crate) offset: f64,
+}
+
+impl Encoding {
+    /// For samples of a type whose finite values span `range`, `range[1] - range[0]` finite; `None` for
+    /// colours.
+    pub(crate) fn new(sample_type: SampleType, range: [f64; 2]) -> Option<Self> {
+        let integers = |texel, offset| Some(Self { texel, scale: 1.0, offset });
+        match sample_type {
+            SampleType::U8 => integers(TexelType::U8, 0.0),
+            SampleType::I8 => integers(TexelType::U8, f64::from(i8::MIN)),
+            SampleType::U16 => integers(TexelType::U16, 0.0),
+            SampleType::I16 => integers(TexelType::U16, f64::from(i16::MIN)),
+            SampleType::U32 | SampleType::I32 | SampleType::F32 | SampleType::F64 => {
+                let width = range[1] - range[0];
+                let scale = if width > 0.0 { width } else { 1.0 };
+                Some(Self { texel: TexelType::F32, scale, offset: range[0] })
+            }
+            SampleType::Rgb8 | SampleType::Rgba8 => None,
+        }
+    }
+
+    /// Lends `samples` as texels, or writes them into `buffer` and lends that.
+    pub(crate) fn encode<'a>(&self, samples: &'a BrickSamples, buffer: &'a mut Buffer) -> Texels<'a> {
+        match samples {
+            BrickSamples::U8(values) => Texels::U8(values),
+            BrickSamples::U16(values) => Texels::U16(values),
+            BrickSamples::I8(values) => {
+                Texels::U8(refill(&mut buffer.bytes, values, |v| v.cast_unsigned() ^ 0x80))
+            }
+            BrickSamples::I16(values) => {
+                Texels::U16(refill(&mut buffer.words, values, |v| v.cast_unsigned() ^ 0x8000))
+            }
+            other => for_brick_samples!(other, |values| {
+                Texels::F32(refill(&mut buffer.floats, values, |v| self.relative(v.channel(0))))
+            }; color _ => Texels::U8(&[])),
+        }
+    }
+
+    /// Where a value stands in the range, 0 to 1; NaN if it is blank.
+    fn relative(&self, value: f64) -> f32 {
+        if value.is_finite() { ((value - self.offset) / self.scale) as f32 } else { f32::NAN }
+    }
+}
+
+/// Room for the texels of a brick whose samples cannot be lent.
+#[derive(Default)]
+pub(crate) struct Buffer {
+    bytes: Vec<u8>,
+    words: Vec<u16>,
+    floats: Vec<f32>,
+}
+
+fn refill<'a, T: Copy, U>(buffer: &'a mut Vec<U>, values: &[T], texel: impl Fn(T) -> U) -> &'a [U] {
+    buffer.clear();
+    buffer.extend(values.iter().map(|&value| texel(value)));
+    buffer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The values that texels stand for.
+    fn decoded(samples: &BrickSamples, range: [f64; 2]) -> Vec<f64> {
+        let encoding = Encoding::new(samples.sample_type(), range).unwrap();
+        let mut buffer = Buffer::default();
+        let texels: Vec<f64> = match encoding.encode(samples, &mut buffer) {
+            Texels::U8(texels) => texels.iter().map(|&t| f64::from(t)).collect(),
+            Texels::U16(texels) => texels.iter().map(|&t| f64::from(t)).collect(),
+            Texels::F32(texels) => texels.iter().map(|&t| f64::from(t)).collect(),
+        };
+        texels.iter().map(|texel| encoding.offset + encoding.scale * texel).collect()
+    }
+
+    #[test]
+    fn narrow_integers_are_exact() {
+        let bytes = BrickSamples::I8(vec![i8::MIN, -1, 0, 1, i8::MAX]);
+        assert_eq!(decoded(&bytes, [-128.0, 127.0]), [-128.0, -1.0, 0.0, 1.0, 127.0]);
+        let words = BrickSamples::I16(vec![i16::MIN, -1, 0, 1, i16::MAX]);
+        assert_eq!(decoded(&words, [-32768.0, 32767.0]), [-32768.0, -1.0, 0.0, 1.0, 32767.0]);
+        assert_eq!(decoded(&BrickSamples::U8(vec![0, 255]), [0.0, 255.0]), [0.0, 255.0]);
+        assert_eq!(decoded(&BrickSamples::U16(vec![0, 65535]), [0.0, 65535.0]), [0.0, 65535.0]);
+    }
+
+    #[test]
+    fn wide_values_are_rounded_by_at_most_two_to_the_minus_25_of_the_range() {
+        let check = |samples: BrickSamples, range: [f64; 2]| {
+            for (index, found) in decoded(&samples, range).into_iter().enumerate() {
+                let off = (found - samples.value(index, 0)).abs() / (range[1] - range[0]);
+                // The sum of offset and product rounds once more, in f64.
+                let rounding = range[1].abs().max(range[0].abs()) / (range[1] - range[0]) * f64::EPSILON;
+                assert!(off <= 2f64.powi(-25) + rounding, "{samples:?} at {index}: {off}");
+            }
+        };
+        let thirds =
+            |from: f64, step: f64| (0..4).map(|i| from + step * f64::from(i) / 3.0).collect::<Vec<_>>();
+        check(BrickSamples::F64(thirds(1e6, 1.0)), [1e6, 1e6 + 1.0]);
+        check(BrickSamples::F64(thirds(-1e300, 1e290)), [-1e300, -1e300 + 1e290]);
+        check(
+            BrickSamples::F32(vec![16_777_215.0, 16_777_216.0, 16_777_218.0]),
+            [16_777_215.0, 16_777_218.0],
+        );
+        check(BrickSamples::I32(vec![i32::MIN, -1, 12_345, i32::MAX]), [-2_147_483_648.0, 2_147_483_647.0]);
+        check(BrickSamples::U32(vec![4_000_000_000, 4_000_000_001]), [4e9, 4_000_000_001.0]);
+    }
+
+    #[test]
+    fn blanks_are_nan_and_colours_are_refused() {
+        let found =
+            decoded(&BrickSamples::F32(vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 2.0]), [2.0, 2.0]);
+        assert!(found[..3].iter().all(|value| value.is_nan()) && found[3] == 2.0, "{found:?}");
+        assert_eq!(Encoding::new(SampleType::Rgb8, [0.0, 255.0]), None);
+    }
+}

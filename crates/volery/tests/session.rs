@@ -1,0 +1,231 @@
+//! Sessions: what stays resident, what a dial does, what backends are asked for.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use volery::fit::Direction;
+use volery::glam::DVec3;
+use volery::{
+    Backend, BackendChoice, ControlPoint, Device, DeviceKind, Image, OpenError, Preset, RenderError,
+    SampleType, Session, TransferFunction, View, ViewOptions, VoxelGrid, open_backend,
+};
+use volery_frame::{Brick, BrickId, DrawError, Drawn, Frame, UploadError, VolumeLayout};
+
+fn software() -> Box<dyn Backend> {
+    open_backend(BackendChoice::Software).unwrap()
+}
+
+fn small() -> ViewOptions {
+    ViewOptions { width: 80, height: 60, ..ViewOptions::default() }
+}
+
+fn session_of(grid: VoxelGrid) -> Session {
+    Session::open(grid, software()).unwrap()
+}
+
+fn turned(session: &Session, azimuth_deg: f64) -> View {
+    let direction = Direction { azimuth_deg, elevation_deg: 10.0, zoom: 1.0 };
+    session.view(&ViewOptions { direction, ..small() })
+}
+
+#[test]
+fn only_what_changed_is_uploaded() {
+    let mut session = session_of(volery_data::marschner_lobb_u8(80));
+    let view = session.view(&small());
+    let first = session.render(&view).unwrap().report.work;
+    assert_eq!(first.bricks, first.nodes);
+    assert!(first.bytes_uploaded > 0);
+    assert_eq!(session.render(&turned(&session, 120.0)).unwrap().report.work.bricks, 0, "another camera");
+    let recolored = View { transfer: session.preset(Preset::Mri), ..view.clone() };
+    assert_eq!(session.render(&recolored).unwrap().report.work.bricks, 0, "another transfer function");
+    let coarse = session.render(&View { tolerance: Some(0.9), ..view.clone() }).unwrap().report.work;
+    assert_eq!(coarse.bricks, coarse.nodes_by_level[1..].iter().sum::<usize>(), "coarse nodes are new");
+    assert!(coarse.bricks > 0);
+    assert_eq!(session.render(&view).unwrap().report.work.bricks, 0, "the fine ones are still there");
+}
+
+#[test]
+fn a_picture_does_not_depend_on_what_was_drawn_before() {
+    let grid = volery_data::marschner_lobb_u8(80);
+    let mut used = session_of(grid.clone());
+    for azimuth in [10.0, 100.0, 250.0] {
+        let view = View { tolerance: Some(0.3), ..turned(&used, azimuth) };
+        used.render(&view).unwrap();
+    }
+    let view = turned(&used, 40.0);
+    let fresh = session_of(grid).render(&view).unwrap().image;
+    assert!(used.render(&view).unwrap().image == fresh);
+}
+
+#[test]
+fn tolerance_0_draws_the_finest_level_alone() {
+    // A constant half: errors there are 0, and still the nodes are fine.
+    let half = volery_data::half_space([70, 70, 70], DVec3::ONE, DVec3::X, 35.0);
+    let mut session = session_of(half);
+    let point = |value, opacity| ControlPoint { value, color: [1.0; 3], opacity };
+    let transfer = TransferFunction::new(vec![point(0.0, 0.01), point(255.0, 0.1)], 1.0).unwrap();
+    let view = session.view(&ViewOptions { transfer: Some(transfer), ..small() });
+    let full = session.render(&view).unwrap();
+    let zero = session.render(&View { tolerance: Some(0.0), ..view.clone() }).unwrap();
+    assert!(full.image == zero.image);
+    assert_eq!(full.report.work.nodes_by_level.len(), 1);
+    assert_eq!(zero.report.work.nodes_by_level, full.report.work.nodes_by_level);
+    let tiny = session.render(&View { tolerance: Some(1e-12), ..view }).unwrap();
+    assert!(tiny.report.work.nodes_by_level.len() > 1, "constant parts may be coarse at any other tolerance");
+}
+
+#[test]
+fn signed_and_shifted_samples_make_the_same_picture() {
+    let unsigned = volery_data::noise([34, 33, 35], 5);
+    let values: Vec<u8> = (0..unsigned.num_samples()).map(|i| unsigned.samples().value(i, 0) as u8).collect();
+    let point = |value: f64, opacity| ControlPoint { value, color: [0.9, 0.5, 0.2], opacity };
+    let transfer = |shift: f64| {
+        TransferFunction::new(vec![point(128.0 + shift, 0.0), point(250.0 + shift, 0.4)], 1.0).unwrap()
+    };
+    let draw = |grid: VoxelGrid, shift: f64| {
+        let mut session = session_of(grid);
+        let view = session.view(&ViewOptions { transfer: Some(transfer(shift)), ..small() });
+        session.render(&view).unwrap().image
+    };
+    let grid = |samples: volery::Samples| VoxelGrid::new(unsigned.dims(), DVec3::ONE, samples).unwrap();
+    let expected = draw(unsigned.clone(), 0.0);
+    let i8s: Vec<i8> = values.iter().map(|&v| (i16::from(v) - 128) as i8).collect();
+    assert!(draw(grid(i8s.into()), -128.0) == expected, "i8");
+    let close = |image: &Image, name: &str| {
+        let off =
+            image.pixels.iter().flatten().zip(expected.pixels.iter().flatten()).map(|(a, b)| (a - b).abs());
+        let largest = off.fold(0.0, f32::max);
+        assert!(largest < 1e-3, "{name}: {largest}");
+    };
+    let at = |shift: f64| values.iter().map(move |&v| f64::from(v) + shift);
+    close(&draw(grid(at(-20_000.0).map(|v| v as i16).collect::<Vec<_>>().into()), -20_000.0), "i16");
+    close(&draw(grid(at(60_000.0).map(|v| v as u16).collect::<Vec<_>>().into()), 60_000.0), "u16");
+    close(&draw(grid(at(-2e9).map(|v| v as i32).collect::<Vec<_>>().into()), -2e9), "i32");
+    close(&draw(grid(at(4e9).map(|v| v as u32).collect::<Vec<_>>().into()), 4e9), "u32");
+    close(&draw(grid(at(1e6).map(|v| v as f32).collect::<Vec<_>>().into()), 1e6), "f32");
+    close(&draw(grid(at(1e12).collect::<Vec<_>>().into()), 1e12), "f64");
+}
+
+#[test]
+fn blank_samples_are_verified_too() {
+    let mut session = session_of(volery_data::holes([40, 36, 34], 11, 0.02));
+    let view = session.view(&small());
+    for tolerance in [None, Some(0.4)] {
+        let view = View { tolerance, ..view.clone() };
+        let mut picture = session.render(&view).unwrap();
+        session.verify(&view, &mut picture, &|_| {}).unwrap();
+        let error = picture.report.error.unwrap();
+        println!("tolerance {tolerance:?}: rmse {:.5}, max {:.5}", error.measured_rmse, error.measured_max);
+        assert!(error.measured_rmse < 0.01, "rmse {}", error.measured_rmse);
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let open = |grid| Session::open(grid, software()).err().unwrap();
+    let colors = VoxelGrid::new([2, 2, 2], DVec3::ONE, vec![[0u8; 4]; 8]).unwrap();
+    assert!(matches!(open(colors), OpenError::Colors { found: SampleType::Rgba8 }));
+    assert!(matches!(open(volery_data::noise([4, 1, 4], 0)), OpenError::Flat { dims: [4, 1, 4] }));
+    let blank = VoxelGrid::new([2, 2, 2], DVec3::ONE, vec![f64::NAN; 8]).unwrap();
+    assert!(matches!(open(blank), OpenError::Blank));
+    let mut session = session_of(volery_data::marschner_lobb(12));
+    let good = session.view(&small());
+    let mut fails = |view: View| session.render(&view).err().unwrap();
+    assert!(matches!(fails(View { width: 0, ..good.clone() }), RenderError::Empty { width: 0, height: 60 }));
+    assert!(matches!(
+        fails(View { tolerance: Some(f64::NAN), ..good.clone() }),
+        RenderError::Tolerance { .. }
+    ));
+    assert!(matches!(fails(View { tolerance: Some(-0.1), ..good.clone() }), RenderError::Tolerance { .. }));
+    assert!(matches!(
+        fails(View { background: [0.0, 1.1, 0.0], ..good.clone() }),
+        RenderError::Background { .. }
+    ));
+    let camera = volery::Camera { eye: good.camera.target, ..good.camera };
+    assert!(matches!(fails(View { camera, ..good.clone() }), RenderError::Camera(_)));
+    assert!(matches!(session.render_frames(&good, 0), Err(RenderError::NoFrame)));
+}
+
+/// Keeps at most `room` bricks, and remembers what it was asked.
+#[derive(Clone, Default)]
+struct Narrow {
+    room: usize,
+    bricks: Arc<Mutex<HashMap<BrickId, usize>>>,
+    largest_upload: Arc<Mutex<usize>>,
+}
+
+impl Backend for Narrow {
+    fn device(&self) -> Device {
+        Device { kind: DeviceKind::Software, name: "narrow".to_owned() }
+    }
+
+    fn set_volume(&mut self, _: &VolumeLayout) -> Result<(), UploadError> {
+        self.bricks.lock().unwrap().clear();
+        Ok(())
+    }
+
+    fn is_resident(&self, id: BrickId) -> bool {
+        self.bricks.lock().unwrap().contains_key(&id)
+    }
+
+    fn upload(&mut self, new: &[Brick<'_>]) -> Result<(), UploadError> {
+        let mut bricks = self.bricks.lock().unwrap();
+        let required = (bricks.len() + new.len()) as u64;
+        if required > self.room as u64 {
+            return Err(UploadError::PoolFull { required, max: self.room as u64 });
+        }
+        let bytes: usize = new.iter().map(|b| b.texels.len() * b.texels.texel_type().bytes()).sum();
+        let mut largest = self.largest_upload.lock().unwrap();
+        *largest = bytes.max(*largest);
+        bricks.extend(new.iter().map(|brick| (brick.id, brick.texels.len())));
+        Ok(())
+    }
+
+    fn resident_bytes(&self) -> u64 {
+        self.bricks.lock().unwrap().len() as u64
+    }
+
+    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
+        let bricks = self.bricks.lock().unwrap();
+        for brick in frame.bricks {
+            assert!(bricks.contains_key(&brick.id), "{brick:?} is not resident");
+        }
+        let pixels = vec![[0.0; 3]; (frame.width * frame.height) as usize];
+        Ok(Drawn { image: Image { width: frame.width, height: frame.height, pixels }, device_seconds: None })
+    }
+}
+
+#[test]
+fn a_full_pool_forgets_what_the_frame_does_not_need() {
+    let grid = volery_data::noise([65, 65, 65], 3);
+    let backend = Narrow { room: 8, ..Narrow::default() };
+    let mut session = Session::open(grid, Box::new(backend.clone())).unwrap();
+    let everything =
+        TransferFunction::new(vec![ControlPoint { value: 0.0, color: [1.0; 3], opacity: 0.1 }], 1.0);
+    let fine = session.view(&ViewOptions { transfer: Some(everything.unwrap()), ..small() });
+    assert_eq!(session.render(&fine).unwrap().report.work.nodes, 8);
+    let coarse = session.render(&View { tolerance: Some(2.0), ..fine.clone() }).unwrap().report.work;
+    assert_eq!((coarse.nodes, coarse.bricks, coarse.bytes_resident), (1, 1, 1), "the 8 fine ones went");
+    assert_eq!(session.render(&fine).unwrap().report.work.bricks, 8);
+    // Room for fewer than one frame needs is an error that says so.
+    let tight = Narrow { room: 7, ..Narrow::default() };
+    let mut session = Session::open(volery_data::noise([65, 65, 65], 3), Box::new(tight)).unwrap();
+    let error = session.render(&fine).unwrap_err().to_string();
+    assert!(error.contains('8') && error.contains('7'), "{error}");
+}
+
+#[test]
+fn uploads_come_in_batches_of_bounded_size() {
+    let backend = Narrow { room: usize::MAX, ..Narrow::default() };
+    let grid = volery_data::ramp([200, 200, 130], DVec3::ONE, DVec3::ONE, 0.0);
+    let mut session = Session::open(grid, Box::new(backend.clone())).unwrap();
+    let everything =
+        TransferFunction::new(vec![ControlPoint { value: 0.0, color: [1.0; 3], opacity: 0.1 }], 1.0);
+    let view = session.view(&ViewOptions { transfer: Some(everything.unwrap()), ..small() });
+    let work = session.render(&view).unwrap().report.work;
+    let largest = *backend.largest_upload.lock().unwrap();
+    assert!(largest <= volery::technique::raycast::BATCH_BYTES, "{largest}");
+    assert!(work.bytes_uploaded > largest as u64, "more than one batch");
+}

@@ -1,0 +1,97 @@
+//! An open device, and the catching of its errors: wgpu reports them out of band, and panics on those that
+//! nobody catches.
+
+use std::sync::{Arc, Mutex};
+
+use volery_frame::Device;
+
+/// An open device.
+pub(crate) struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    pub(crate) info: Device,
+    /// What went wrong outside of any check, until somebody asks.
+    stray: Arc<Mutex<Option<String>>>,
+}
+
+/// What a device reports.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Failure {
+    OutOfMemory,
+    Other(String),
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::OutOfMemory => f.write_str("out of memory"),
+            Self::Other(text) => f.write_str(text),
+        }
+    }
+}
+
+impl Gpu {
+    pub(crate) fn open(adapter: &wgpu::Adapter, info: Device) -> Result<Self, String> {
+        let useful = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("volery"),
+            required_features: adapter.features() & useful,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| one_line(&e.to_string()))?;
+        let stray = Arc::new(Mutex::new(None));
+        let keep = |stray: &Arc<Mutex<Option<String>>>, text: String| {
+            if let Ok(mut stray) = stray.lock() {
+                stray.get_or_insert(one_line(&text));
+            }
+        };
+        let uncaught = stray.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| keep(&uncaught, error.to_string())));
+        let lost = stray.clone();
+        device.set_device_lost_callback(move |reason, text| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                keep(&lost, format!("lost: {text}"));
+            }
+        });
+        Ok(Self { device, queue, info, stray })
+    }
+
+    pub(crate) fn has(&self, features: wgpu::Features) -> bool {
+        self.device.features().contains(features)
+    }
+
+    /// Runs calls to the device, and returns the first error that they cause.
+    pub(crate) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, Failure> {
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let result = calls();
+        // Scopes are a stack: the last one pushed is the first to go.
+        let errors = [internal.pop(), validation.pop(), memory.pop()].map(|scope| match pollster::block_on(scope) {
+            None => None,
+            Some(wgpu::Error::OutOfMemory { .. }) => Some(Failure::OutOfMemory),
+            Some(error) => Some(Failure::Other(one_line(&error.to_string()))),
+        });
+        let stray = self.stray.lock().ok().and_then(|mut stray| stray.take()).map(Failure::Other);
+        // Out of memory first: the others may follow from it.
+        match errors.into_iter().rev().flatten().chain(stray).next() {
+            None => Ok(result),
+            Some(failure) => Err(failure),
+        }
+    }
+
+    /// Waits until the device has done all that was submitted.
+    pub(crate) fn wait(&self) -> Result<(), Failure> {
+        match self.device.poll(wgpu::PollType::wait_indefinitely()) {
+            Ok(_) => Ok(()),
+            Err(error) => Err(Failure::Other(one_line(&error.to_string()))),
+        }
+    }
+}
+
+/// Drivers' messages run over many lines; an error is one.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

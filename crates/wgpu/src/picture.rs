@@ -1,0 +1,131 @@
+//! The picture on its way back: drawn in bands of rows, so that neither the size of a buffer nor the patience
+//! of a driver limits it, and read as f32.
+
+use std::sync::mpsc;
+
+use crate::gpu::{Failure, Gpu};
+
+/// Bytes of a pixel: three f32.
+const PIXEL_BYTES: u64 = 12;
+
+/// Most bytes of a band.
+const BAND_BYTES: u64 = 64 << 20;
+
+/// Bytes of the two timestamps behind the pixels in the staging buffer.
+const STAMP_BYTES: u64 = 16;
+
+/// Buffers for one band, and the clock.
+pub(crate) struct Band {
+    pub(crate) pixels: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    stamps: Option<Stamps>,
+    bytes: u64,
+}
+
+struct Stamps {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+}
+
+/// Rows of a band in pictures of this width: multiples of a tile.
+pub(crate) fn rows_per_band(gpu: &Gpu, width: u32, height: u32, tile: u32) -> u32 {
+    let limits = gpu.device.limits();
+    let bytes = BAND_BYTES.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
+    let rows = bytes / (u64::from(width) * PIXEL_BYTES);
+    let rows = u32::try_from(rows).unwrap_or(u32::MAX).min(height.next_multiple_of(tile));
+    (rows / tile).max(1) * tile
+}
+
+impl Band {
+    pub(crate) fn new(gpu: &Gpu, width: u32, rows: u32) -> Self {
+        let bytes = u64::from(width) * u64::from(rows) * PIXEL_BYTES;
+        let buffer = |label, size, usage| {
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+            gpu.device.create_buffer(&descriptor)
+        };
+        let stamps = gpu.has(wgpu::Features::TIMESTAMP_QUERY).then(|| Stamps {
+            queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("volery timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            }),
+            resolved: buffer(
+                "volery timestamps",
+                STAMP_BYTES,
+                wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            ),
+        });
+        Self {
+            pixels: buffer(
+                "volery picture",
+                bytes,
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            ),
+            // Timestamps lie behind the pixels, at a multiple of their 8 bytes: rows come in tiles of 8.
+            staging: buffer(
+                "volery picture staging",
+                bytes + STAMP_BYTES,
+                wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            ),
+            stamps,
+            bytes,
+        }
+    }
+
+    /// Whether pictures of this width can be drawn in bands of these rows.
+    pub(crate) fn fits(&self, width: u32, rows: u32) -> bool {
+        self.bytes == u64::from(width) * u64::from(rows) * PIXEL_BYTES
+    }
+
+    /// Runs a compute pass that fills [`Band::pixels`], appends the pixels of `num_pixels` to `picture`, and
+    /// returns the device's own seconds.
+    pub(crate) fn run(
+        &self,
+        gpu: &Gpu,
+        num_pixels: usize,
+        picture: &mut Vec<[f32; 3]>,
+        encode: impl FnOnce(&mut wgpu::ComputePass<'_>),
+    ) -> Result<Option<f64>, Failure> {
+        let received = gpu.checked(|| {
+            self.submit(gpu, encode);
+            let (sender, receiver) = mpsc::channel();
+            self.staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+            gpu.wait().map(|()| receiver)
+        })??;
+        match received.recv() {
+            Ok(Ok(())) => {}
+            _ => return Err(Failure::Other("the picture could not be read back".to_owned())),
+        }
+        let view = self.staging.get_mapped_range(..).map_err(|e| Failure::Other(e.to_string()))?;
+        let (pixels, stamps) = view.split_at(self.bytes as usize);
+        picture.extend_from_slice(&bytemuck::cast_slice(pixels)[..num_pixels]);
+        let seconds = self.stamps.is_some().then(|| {
+            let [from, to] = [0, 8].map(|i| u64::from_le_bytes(std::array::from_fn(|byte| stamps[i + byte])));
+            to.saturating_sub(from) as f64 * f64::from(gpu.queue.get_timestamp_period()) * 1e-9
+        });
+        drop(view);
+        self.staging.unmap();
+        Ok(seconds)
+    }
+
+    fn submit(&self, gpu: &Gpu, encode: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("volery raycast") };
+        let mut encoder = gpu.device.create_command_encoder(&descriptor);
+        let timestamp_writes = self.stamps.as_ref().map(|stamps| wgpu::ComputePassTimestampWrites {
+            query_set: &stamps.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        });
+        let descriptor = wgpu::ComputePassDescriptor { label: Some("volery raycast"), timestamp_writes };
+        let mut pass = encoder.begin_compute_pass(&descriptor);
+        encode(&mut pass);
+        drop(pass);
+        encoder.copy_buffer_to_buffer(&self.pixels, 0, &self.staging, 0, self.bytes);
+        if let Some(stamps) = &self.stamps {
+            encoder.resolve_query_set(&stamps.queries, 0..2, &stamps.resolved, 0);
+            encoder.copy_buffer_to_buffer(&stamps.resolved, 0, &self.staging, self.bytes, STAMP_BYTES);
+        }
+        gpu.queue.submit([encoder.finish()]);
+    }
+}

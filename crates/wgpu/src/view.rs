@@ -1,0 +1,76 @@
+//! From a frame to the numbers that the shader reads: in f64 up to the last step.
+
+use glam::DVec3;
+use volery_frame::{Frame, VolumeLayout};
+use volery_scene::{Projection, RayGrid};
+use volery_shaders::raycast;
+
+use crate::pool::Pool;
+use crate::units::Units;
+
+/// The rays of a picture, which start near the volume: in perspective at the depth where the volume begins,
+/// so that nothing of it lies before their start and f32 loses nothing to a far eye.
+fn rays_near_volume(frame: &Frame<'_>, layout: &VolumeLayout) -> RayGrid {
+    let rays = frame.camera.rays(frame.width, frame.height);
+    let Projection::Perspective { .. } = frame.camera.projection else { return rays };
+    let [_, _, forward] = frame.camera.axes();
+    let extent = DVec3::from_array(layout.cells.map(f64::from)) * layout.spacing;
+    let depth_of = |corner: DVec3| (corner - frame.camera.eye).dot(forward);
+    // The nearest corner is the one that lies most against the view.
+    let nearest = DVec3::select(forward.cmplt(DVec3::ZERO), extent, DVec3::ZERO);
+    // The directions' part along `forward` is 1, so a depth is a factor.
+    let depth = depth_of(nearest).max(0.0);
+    RayGrid {
+        origin: rays.origin + rays.toward * depth,
+        origin_dx: rays.toward_dx * depth,
+        origin_dy: rays.toward_dy * depth,
+        ..rays
+    }
+}
+
+/// The shader's frame; the band of rows is still open.
+pub(crate) fn shader_frame(
+    frame: &Frame<'_>,
+    layout: &VolumeLayout,
+    units: &Units,
+    pool: &Pool,
+) -> raycast::Frame {
+    let rays = rays_near_volume(frame, layout);
+    let in_cells = |v: DVec3| (v / layout.spacing).as_vec3().to_array();
+    // Directions are only directions: of any length, so of one that f32 holds.
+    let longest = rays.toward.length().max(f64::MIN_POSITIVE);
+    let spacing = layout.spacing.max_element();
+    let direction = |v: DVec3| (v / longest * (spacing / layout.spacing)).as_vec3().to_array();
+    let depth = layout.spacing / frame.transfer.unit_length() * std::f64::consts::LOG2_E;
+    let texels_per_unit = pool.texels_per_unit();
+    let [scale, offset] = frame.transfer.bin_from_value();
+    // bin = scale * (value_scale * texel + value_offset) + offset, and its zero first, which f32 subtracts
+    // without loss.
+    let bins_per_texel = scale * layout.value_scale;
+    let texel_of_bin_zero = -(scale * layout.value_offset + offset) / bins_per_texel;
+    raycast::Frame {
+        origin: in_cells(rays.origin),
+        width: frame.width,
+        origin_dx: in_cells(rays.origin_dx),
+        end_row: 0,
+        origin_dy: in_cells(rays.origin_dy),
+        first_row: 0,
+        toward: direction(rays.toward),
+        unit_cells: units.unit_cells,
+        toward_dx: direction(rays.toward_dx),
+        block_cells: crate::blocks::block_cells(layout.brick_cells),
+        toward_dy: direction(rays.toward_dy),
+        brick_cells: layout.brick_cells,
+        cells: layout.cells.map(|n| n as f32),
+        units_per_cell: 1.0 / units.unit_cells as f32,
+        depth_per_cell: depth.as_vec3().to_array(),
+        texel_of_bin_zero: (texel_of_bin_zero / texels_per_unit) as f32,
+        background: frame.background,
+        bins_per_texel: (bins_per_texel * texels_per_unit) as f32,
+        atlas_scale: pool.texture_size().map(|n| 1.0 / n as f32),
+        num_bins: frame.transfer.num_bins() as f32,
+        slices_per_row: pool.slot().slices_per_row as f32,
+        slot_height: pool.slot().size[1] as f32,
+        ..bytemuck::Zeroable::zeroed()
+    }
+}

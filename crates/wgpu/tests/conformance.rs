@@ -1,0 +1,28 @@
+//! The conformance suite of `volery-frame` on this machine's best device.
+//!
+//! Without a device every test fails, unless `VOLERY_WITHOUT_GPU` is set: then all are counted as ignored.
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use volery_frame::conformance::{ALL, Property};
+use volery_wgpu::WgpuBackend;
+
+fn main() {
+    let mut arguments = Arguments::from_args();
+    // One device; its memory and its threads are not to be shared.
+    arguments.test_threads = Some(1);
+    let without_gpu = std::env::var_os("VOLERY_WITHOUT_GPU").is_some();
+    let trials = ALL.iter().map(|&property| trial(property).with_ignored_flag(without_gpu)).collect();
+    let conclusion = libtest_mimic::run(&arguments, trials);
+    if without_gpu {
+        println!("ignored: {} GPU tests (VOLERY_WITHOUT_GPU)", conclusion.num_ignored);
+    }
+    conclusion.exit();
+}
+
+fn trial((name, check): Property) -> Trial {
+    Trial::test(name, move || {
+        let mut backend = WgpuBackend::new().map_err(|error| Failed::from(error.to_string()))?;
+        check(&mut backend);
+        Ok(())
+    })
+}

@@ -1,0 +1,83 @@
+//! Validates every WGSL file with naga and writes what the Rust side must agree with: `emit` says what.
+//!
+//! A file that does not parse or validate fails the build; all such files are reported, not only the first.
+
+mod emit;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+/// A shader file that validated.
+struct Shader {
+    /// File name without its extension; the name of the Rust module.
+    name: String,
+    path: PathBuf,
+    module: naga::Module,
+}
+
+fn main() {
+    if let Err(report) = run() {
+        eprintln!("{report}");
+        std::process::exit(1);
+    }
+}
+
+fn run() -> Result<(), String> {
+    let folder = Path::new(&env::var("CARGO_MANIFEST_DIR").map_err(|e| e.to_string())?).join("src/wgsl");
+    println!("cargo::rerun-if-changed=build");
+    println!("cargo::rerun-if-changed={}", folder.display());
+    let mut report = String::new();
+    let mut rust = String::new();
+    let paths = wgsl_files(&folder)?;
+    for path in &paths {
+        let text = load(path).and_then(|shader| emit::module(&shader));
+        match text {
+            Ok(text) => rust += &text,
+            Err(error) => report += &format!("{error}\n"),
+        }
+    }
+    if paths.is_empty() {
+        let _ = writeln!(report, "{}: no .wgsl file, expected at least 1", folder.display());
+    }
+    if !report.is_empty() {
+        return Err(report);
+    }
+    let names = paths.iter().map(|path| name_of(path)).collect::<Result<Vec<_>, _>>()?;
+    rust += &emit::list(&names);
+    let out = Path::new(&env::var("OUT_DIR").map_err(|e| e.to_string())?).join("shaders.rs");
+    fs::write(&out, rust).map_err(|e| format!("{}: {e}", out.display()))
+}
+
+/// All shader files, in order of name.
+fn wgsl_files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|e| format!("{}: {e}", folder.display()))?.path();
+        if path.extension().is_some_and(|extension| extension == "wgsl") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+fn name_of(path: &Path) -> Result<String, String> {
+    let stem = path.file_stem().and_then(|stem| stem.to_str());
+    stem.map(str::to_owned).ok_or_else(|| format!("{}: expected a name in ASCII", path.display()))
+}
+
+fn load(path: &Path) -> Result<Shader, String> {
+    let shown = path.display().to_string();
+    let source = fs::read_to_string(path).map_err(|e| format!("{shown}: {e}"))?;
+    let module =
+        naga::front::wgsl::parse_str(&source).map_err(|e| e.emit_to_string_with_path(&source, &shown))?;
+    // Without capabilities: what every device has.
+    Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(&module)
+        .map_err(|e| e.emit_to_string_with_path(&source, &shown))?;
+    Ok(Shader { name: name_of(path)?, path: path.to_owned(), module })
+}

@@ -1,0 +1,244 @@
+// Casts one ray per pixel through the bricks of a volume.
+//
+// A ray runs through three grids. *Units* cover the volume evenly and say where it is empty and how far around;
+// a ray leaps over such space. A *block* is the part of a brick that is marched at a stretch. In a block the ray
+// visits the cells between samples: along a ray the trilinear field of a cell has no kinks, and the pieces
+// within a cell are integrated through the transfer function's antiderivative.
+//
+// Positions are in finest cells from the volume's lower corner until a block is entered, then in the brick's own
+// cells from the brick's lower corner. `t` is the way along the ray in finest cells, from a start that the CPU
+// chose near the volume, so that 32 bits do.
+
+struct Frame {
+    // The ray of image point (x, y) starts at `origin + x * origin_dx + y * origin_dy`, directions likewise.
+    origin: vec3f,
+    width: u32,
+    origin_dx: vec3f,
+    // One past the last row of this band of the picture.
+    end_row: u32,
+    origin_dy: vec3f,
+    first_row: u32,
+    toward: vec3f,
+    // Finest cells per edge of a unit.
+    unit_cells: u32,
+    toward_dx: vec3f,
+    // A brick's own cells per edge of a block.
+    block_cells: u32,
+    toward_dy: vec3f,
+    // A brick's own cells per edge of a brick.
+    brick_cells: u32,
+    // Of the volume, in finest cells.
+    cells: vec3f,
+    units_per_cell: f32,
+    // Per axis: optical depth to the base 2 per finest cell of matter that has depth 1 per unit length.
+    depth_per_cell: vec3f,
+    // bin = (texel - texel_of_bin_zero) * bins_per_texel
+    texel_of_bin_zero: f32,
+    background: vec3f,
+    bins_per_texel: f32,
+    // One over the atlas's size in texels.
+    atlas_scale: vec2f,
+    num_bins: f32,
+    // Of a brick in the atlas: slices side by side, and rows of texels.
+    slices_per_row: f32,
+    slot_height: f32,
+}
+
+// Whether texels may be blank; then no value is carried from one cell to the next.
+override HAS_BLANKS: bool = false;
+
+// Texels from here on are blank.
+const BLANK: f32 = 1e38;
+// Optical depth to the base 2 at which a ray stops: it lets 1/4096 of the light through.
+const OPAQUE_DEPTH: f32 = 12.0;
+// Pixels per edge of a workgroup's tile.
+const TILE: u32 = 8;
+// In a unit's first word: set where it holds matter; then come the level, and the layer and row of the brick's
+// slot.
+const OCCUPIED: u32 = 0x80000000;
+const LEVEL_SHIFT: u32 = 26;
+const LEVEL_MASK: u32 = 31;
+const NO_LEVEL: u32 = 32;
+const LAYER_SHIFT: u32 = 13;
+const SLOT_MASK: u32 = 0x1fff;
+// In a unit's second word: the brick's cells per axis.
+const CELLS_SHIFT: u32 = 10;
+const CELLS_MASK: u32 = 1023;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+// Of empty units the first word is the distance to the nearest occupied one in units, along the axis where it
+// is largest.
+@group(0) @binding(1) var units: texture_3d<u32>;
+// A brick's slices of equal z lie side by side, in rows of `slices_per_row`; bricks one below the other, then
+// in layers. So a brick is compact in memory, and a gather reads four corners of a cell at once.
+@group(0) @binding(2) var atlas: texture_2d_array<f32>;
+@group(0) @binding(3) var atlas_sampler: sampler;
+@group(0) @binding(4) var transfer: texture_2d<f32>;
+@group(0) @binding(5) var<storage, read_write> picture: array<f32>;
+
+struct Ray {
+    start: vec3f,
+    direction: vec3f,
+    inverse: vec3f,
+    // 1 along axes where the ray rises, 0 where it falls.
+    rising: vec3f,
+    // Optical depth per t of matter that has depth 1 per unit length.
+    depth_per_t: f32,
+}
+
+struct Light {
+    color: vec3f,
+    depth: f32,
+    transmittance: f32,
+}
+
+// One end of a piece of ray: its bin, and the antiderivatives there.
+struct End {
+    bin: i32,
+    sums: vec4f,
+}
+
+// The corners of a cell below and above in z, as textureGather orders them.
+struct Corners {
+    low: vec4f,
+    rise: vec4f,
+}
+
+fn smallest(v: vec3f) -> f32 {
+    return min(v.x, min(v.y, v.z));
+}
+
+fn largest(v: vec3f) -> f32 {
+    return max(v.x, max(v.y, v.z));
+}
+
+fn ray_of_pixel(pixel: vec2u) -> Ray {
+    let at = vec2f(pixel) + 0.5;
+    let start = frame.origin + at.x * frame.origin_dx + at.y * frame.origin_dy;
+    let toward = normalize(frame.toward + at.x * frame.toward_dx + at.y * frame.toward_dy);
+    let rising = toward >= vec3f(0.0);
+    // No component is zero, so that no face is infinitely far or NaN away.
+    let direction = select(min(toward, vec3f(-1e-12)), max(toward, vec3f(1e-12)), rising);
+    let depth_per_t = length(direction * frame.depth_per_cell);
+    return Ray(start, direction, 1.0 / direction, select(vec3f(0.0), vec3f(1.0), rising), depth_per_t);
+}
+
+// Where a gather reads the corners of a cell in the slice z of a brick.
+fn slice_place(corner: vec2f, z: f32) -> vec2f {
+    let row = floor((z + 0.5) / frame.slices_per_row);
+    let edge = f32(frame.brick_cells + 1u);
+    return (corner + edge * vec2f(z - row * frame.slices_per_row, row)) * frame.atlas_scale;
+}
+
+fn corners_of_cell(slot: vec2u, cell: vec3f) -> Corners {
+    let corner = vec2f(0.0, f32(slot.y) * frame.slot_height) + cell.xy + 1.0;
+    let low = textureGather(0, atlas, atlas_sampler, slice_place(corner, cell.z), slot.x);
+    let high = textureGather(0, atlas, atlas_sampler, slice_place(corner, cell.z + 1.0), slot.x);
+    return Corners(low, high - low);
+}
+
+fn bin_at(corners: Corners, w: vec3f) -> i32 {
+    let face = corners.low + w.z * corners.rise;
+    // Gathered in the order (0, 1), (1, 1), (1, 0), (0, 0) of (x, y).
+    let front = face.w + w.x * (face.z - face.w);
+    let back = face.x + w.x * (face.y - face.x);
+    let texel = front + w.y * (back - front);
+    let bin = (texel - frame.texel_of_bin_zero) * frame.bins_per_texel;
+    return i32(clamp(bin, 0.0, frame.num_bins) + 0.5);
+}
+
+fn end_of(bin: i32) -> End {
+    return End(bin, textureLoad(transfer, vec2i(bin, 0), 0));
+}
+
+// Adds the light of a piece of ray and returns its far end.
+fn integrate(light: ptr<function, Light>, from_end: End, bin: i32, depth_scale: f32) -> End {
+    let is_flat = bin == from_end.bin;
+    let to_bin = bin + select(0, 1, is_flat);
+    let sums = textureLoad(transfer, vec2i(to_bin, 0), 0);
+    let change = sums - from_end.sums;
+    let depth = (*light).depth + depth_scale * change.w / f32(to_bin - from_end.bin);
+    let transmittance = exp2(-depth);
+    // The differences of transmittance add up to exactly what is missing behind.
+    let share = ((*light).transmittance - transmittance) / select(change.w, 1.0, change.w == 0.0);
+    (*light).color += share * change.rgb;
+    (*light).depth = depth;
+    (*light).transmittance = transmittance;
+    return End(bin, select(sums, from_end.sums, is_flat));
+}
+
+// The light that a ray sees.
+//
+// One loop, each round of which leaves one box: a cell of a brick, or a cube of empty units. Nested loops would
+// make the rays of a SIMD group wait for one another at the end of each inner one.
+fn light_along(ray: Ray) -> vec3f {
+    let first_faces = (mix(frame.cells, vec3f(0.0), ray.rising) - ray.start) * ray.inverse;
+    let last_faces = (mix(vec3f(0.0), frame.cells, ray.rising) - ray.start) * ray.inverse;
+    var t = max(largest(first_faces), 0.0);
+    let t_end = smallest(last_faces);
+    // The finest cell that the ray is in.
+    var place = clamp(floor(ray.start + t * ray.direction), vec3f(0.0), frame.cells - 1.0);
+    var light = Light(vec3f(0.0), 0.0, 1.0);
+    // The value at t, where the cell before was of the same level; its level, or none.
+    var end = End(0, vec4f(0.0));
+    var end_level = NO_LEVEL;
+    let unit_size = f32(frame.unit_cells);
+    while t < t_end && light.depth < OPAQUE_DEPTH && all(place >= vec3f(0.0)) && all(place < frame.cells) {
+        let unit = floor((place + 0.5) * frame.units_per_cell);
+        let words = textureLoad(units, vec3i(unit), 0).xy;
+        let is_occupied = (words.x & OCCUPIED) != 0u;
+        let level = (words.x >> LEVEL_SHIFT) & LEVEL_MASK;
+        let scale = f32(1u << level);
+        // Of the brick and its cell: lower corner.
+        let brick_size = scale * f32(frame.brick_cells);
+        let brick_low = floor((place + 0.5) / brick_size) * brick_size;
+        let cell = floor((place + 0.5 - brick_low) / scale);
+        let cells = vec3f((vec3u(words.y) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));
+        let is_visible = is_occupied && all(cell < cells);
+        // The box that this round leaves.
+        let radius = f32(words.x) - 1.0;
+        let low = select((unit - radius) * unit_size, brick_low + cell * scale, is_occupied);
+        let high = low + select((2.0 * radius + 1.0) * unit_size, scale, is_occupied);
+        let faces = (mix(low, high, ray.rising) - ray.start) * ray.inverse;
+        let exit = max(min(smallest(faces), t_end), t);
+        // A round without length finds the value where a run of cells begins.
+        let is_start = is_visible && level != end_level;
+        let t_next = select(exit, t, is_start);
+
+        let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
+        let corners = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
+        let origin = ray.start - low;
+        let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t / 1.0, is_visible);
+        let middle = bin_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) / scale);
+        let last = bin_at(corners, (origin + t_next * ray.direction) / scale);
+        end = integrate(&light, end, middle, depth);
+        end = integrate(&light, end, last, depth);
+        end_level = select(NO_LEVEL, level, is_visible);
+
+        let inside = clamp(floor(ray.start + t_next * ray.direction), low, high - 1.0);
+        let beyond = mix(low - 1.0, high, ray.rising);
+        place = select(select(inside, beyond, faces <= vec3f(t_next)), place, vec3<bool>(is_start));
+        t = t_next;
+    }
+    return light.color + light.transmittance * frame.background;
+}
+
+// Pixels of a tile in an order that keeps neighbours in one SIMD group of 8 or more.
+fn place_in_tile(lane: u32) -> vec2u {
+    let x = (lane & 3u) | ((lane >> 3u) & 1u) << 2u;
+    let y = ((lane >> 2u) & 1u) | (lane >> 4u) << 1u;
+    return vec2u(x, y);
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let pixel = group.xy * TILE + place_in_tile(lane) + vec2u(0u, frame.first_row);
+    if pixel.x >= frame.width || pixel.y >= frame.end_row {
+        return;
+    }
+    let color = light_along(ray_of_pixel(pixel));
+    let index = 3u * ((pixel.y - frame.first_row) * frame.width + pixel.x);
+    picture[index] = color.r;
+    picture[index + 1u] = color.g;
+    picture[index + 2u] = color.b;
+}

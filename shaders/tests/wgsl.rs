@@ -1,0 +1,41 @@
+//! Every shader file is part of the crate, and what is reflected is what the file says.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use volery_shaders::{ALL, BindingKind, raycast};
+
+/// The build validates what it finds; this finds out that it looked at everything.
+#[test]
+fn every_wgsl_file_was_validated() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut pending = vec![folder.to_owned()];
+    let mut files = BTreeMap::new();
+    while let Some(folder) = pending.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                pending.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "wgsl") {
+                let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+                files.insert(name, std::fs::read_to_string(&path).unwrap());
+            }
+        }
+    }
+    println!("{} shader files: {:?}", files.len(), files.keys());
+    assert!(!files.is_empty(), "no .wgsl file under {}", folder.display());
+    let all: BTreeMap<_, _> = ALL.iter().map(|&(name, text)| (name.to_owned(), text.to_owned())).collect();
+    assert_eq!(files, all, "files on disk and shaders in the crate");
+}
+
+#[test]
+fn reflection_says_what_the_file_says() {
+    assert_eq!(raycast::TILE * raycast::TILE, raycast::MAIN_WORKGROUP.iter().product::<u32>());
+    assert_eq!(raycast::OPAQUE_DEPTH, 12.0);
+    assert_eq!(std::mem::offset_of!(raycast::Frame, width), 12);
+    assert_eq!(size_of::<raycast::Frame>() % 16, 0);
+    let numbers: Vec<_> = raycast::BINDINGS.iter().map(|b| (b.group, b.binding)).collect();
+    assert_eq!(numbers, (0..numbers.len() as u32).map(|i| (0, i)).collect::<Vec<_>>());
+    let picture = raycast::BINDINGS.iter().find(|b| b.name == "picture").unwrap();
+    assert_eq!(picture.kind, BindingKind::Storage { read_only: false });
+}

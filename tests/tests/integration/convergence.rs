@@ -1,0 +1,82 @@
+//! Orders of convergence (Etiene and others 2014): halve the grid, and the error must fall as the method
+//! promises. It finds what golden pictures hide.
+
+use glam::DVec3;
+use volery::{BackendChoice, Camera, ControlPoint, Session, TransferFunction, View};
+use volery_reference::Image;
+use volery_scene::VoxelGrid;
+use volery_tests::{SMOOTH_EXTENT, backend, distance, draw, exact, smooth};
+
+/// Colour and opacity change with the value, without a kink inside the field's range.
+fn view() -> View {
+    let points = vec![
+        ControlPoint { value: 0.0, color: [0.1, 0.3, 0.9], opacity: 0.0 },
+        ControlPoint { value: 1.0, color: [1.0, 0.6, 0.1], opacity: 0.6 },
+    ];
+    View {
+        width: 48,
+        height: 48,
+        camera: Camera::fitted(DVec3::splat(SMOOTH_EXTENT), 30.0, 20.0, 1.0, false),
+        transfer: TransferFunction::new(points, 1.0).unwrap(),
+        background: [0.0; 3],
+        tolerance: None,
+    }
+}
+
+fn truth(grid: &VoxelGrid, view: &View) -> Image {
+    volery_reference::render(grid, &view.camera, &view.transfer, view.background, view.width, view.height)
+        .unwrap()
+}
+
+/// Orders between neighbouring errors of halved cells.
+fn orders(errors: &[f64]) -> Vec<f64> {
+    errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
+}
+
+#[test]
+fn the_reference_converges_with_the_grid_at_second_order() {
+    // Trilinear interpolation is of second order, the integral along the ray is exact.
+    let view = view();
+    let finest = truth(&smooth(256), &view);
+    let errors = [8, 16, 32].map(|cells| {
+        let found =
+            distance(&format!("reference, {cells} cells to 256"), &truth(&smooth(cells), &view), &finest);
+        found.rmse
+    });
+    let found = orders(&errors);
+    println!("orders {found:.2?}, expected 2 within .15");
+    assert!(found.iter().all(|order| (order - 2.0).abs() < 0.15), "{found:?}");
+}
+
+by_both_backends! { a_backend_converges_to_the_reference_at_second_order }
+
+fn a_backend_converges_to_the_reference_at_second_order(choice: BackendChoice, test: &str) {
+    // On the same samples, what is left is the integration: half cells taken as linear.
+    let view = view();
+    let mut errors = Vec::new();
+    for cells in [8, 16, 32] {
+        let grid = smooth(cells);
+        let Some(backend) = backend(choice, test) else { return };
+        let drawn = exact(&draw(&mut Session::open(grid.clone(), backend).unwrap(), &view).image);
+        errors.push(distance(&format!("{choice:?}, {cells} cells"), &drawn, &truth(&grid, &view)).rmse);
+    }
+    let found = orders(&errors);
+    println!("orders {found:.2?}, expected at least 1.8");
+    assert!(found.iter().all(|order| *order >= 1.8), "{choice:?}: {found:?}");
+}
+
+#[test]
+fn pixels_converge_to_the_integral_over_the_picture() {
+    // A pixel is its centre: the mean over the picture is a midpoint rule. The silhouette has kinks but no steps,
+    // so its order is above 1.
+    let grid = smooth(8);
+    let mean = |size: u32| {
+        let image = truth(&grid, &View { width: size, height: size, ..view() });
+        image.pixels().iter().flatten().sum::<f64>() / f64::from(size * size * 3)
+    };
+    let finest = mean(512);
+    let errors = [16, 32, 64, 128].map(|size| (mean(size) - finest).abs());
+    let order = (errors[0] / errors[3]).log2() / 3.0;
+    println!("errors {errors:?}, order {order:.2}, expected above 1");
+    assert!(order > 1.0, "{order}");
+}

@@ -1,0 +1,184 @@
+"""Draws peer scenes with VTK for `cargo xtask bench peers`: one JSON request a line in, one JSON reply a line out.
+
+  {"do": "probe"}                                                        {"vtk", "window", "device"}
+  {"do": "load", "scene": FILE, "data": DIR, "reference": NPY or null}   {"name", "dims"}
+  {"do": "draw", "mapper": "gpu"|"fixed", "step": VOXELS, "frames": N}   {"seconds": [..], "errors": {..}}
+
+A draw makes a window, draws one frame that is not timed (upload, shader compilation) and keeps it as the picture,
+then times N frames with the camera turned by a ten-thousandth of a degree between them. A frame ends when OpenGL has
+finished; reading it back is not in the time. Errors are of the whole picture, channel by channel, in [0, 1]:
+against the f64 reference, and against VTK's own picture at a sixteenth of a voxel. VTK's picture has 8 bits a channel.
+"""
+
+import gzip
+import json
+import os
+import sys
+import time
+
+if "DISPLAY" not in os.environ:
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+import numpy as np
+import vtk
+from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+CONVERGED_STEP_VOXELS = 1 / 16
+TURN_DEGREES = 1e-4
+
+
+def read_volume(file, layout):
+    """The samples of a raw or NIfTI file as a vtkImageData whose first sample is at the origin."""
+    if file.endswith((".nii", ".nii.gz")):
+        reader = vtk.vtkNIFTIImageReader()
+        reader.SetFileName(file)
+        reader.Update()
+        read = reader.GetOutput()
+        dims, spacing = read.GetDimensions(), read.GetSpacing()
+        samples = vtk_to_numpy(read.GetPointData().GetScalars())
+    else:
+        with (gzip.open if file.endswith(".gz") else open)(file, "rb") as stream:
+            stored = np.frombuffer(stream.read(), dtype=layout["dtype"])
+        dims, spacing = layout["dims"], layout.get("spacing", (1, 1, 1))
+        samples = stored.astype(stored.dtype.newbyteorder("="))
+    volume = vtk.vtkImageData()
+    volume.SetDimensions(dims)
+    volume.SetSpacing(spacing)
+    volume.GetPointData().SetScalars(numpy_to_vtk(samples, deep=True))
+    return volume
+
+
+def look_of(transfer):
+    """Unshaded, linearly interpolated, with the opacities of `transfer` per its unit distance."""
+    look = vtk.vtkVolumeProperty()
+    look.ShadeOff()
+    look.SetInterpolationTypeToLinear()
+    colors, opacities = vtk.vtkColorTransferFunction(), vtk.vtkPiecewiseFunction()
+    for point in transfer["points"]:
+        colors.AddRGBPoint(point["value"], *point["color"])
+        opacities.AddPoint(point["value"], point["opacity"])
+    look.SetColor(colors)
+    look.SetScalarOpacity(opacities)
+    look.SetScalarOpacityUnitDistance(transfer["unit_distance"])
+    return look
+
+
+def mapper_of(kind, step_world):
+    """VTK's mapper of that kind with a fixed step and none of its automatic loss of quality."""
+    if kind == "gpu":
+        mapper = vtk.vtkGPUVolumeRayCastMapper()
+        mapper.SetUseJittering(False)
+        mapper.SetMaxMemoryInBytes(4 << 30)
+    else:
+        mapper = vtk.vtkFixedPointVolumeRayCastMapper()
+        mapper.LockSampleDistanceToInputSpacingOff()
+        mapper.SetInteractiveSampleDistance(step_world)
+        mapper.SetImageSampleDistance(1)
+    mapper.SetAutoAdjustSampleDistances(False)
+    mapper.SetSampleDistance(step_world)
+    return mapper
+
+
+class Scene:
+    """A loaded scene; the reference picture and VTK's converged one come with it."""
+
+    def __init__(self, file, data_folder, reference_file):
+        with open(file, encoding="utf-8") as stream:
+            self.described = json.load(stream)
+        source = self.described["input"]
+        self.volume = read_volume(os.path.join(data_folder, source["file"]), source)
+        self.reference = None if reference_file is None else np.load(reference_file).astype(float)
+        self.converged, _ = self.draw("gpu", CONVERGED_STEP_VOXELS, frames=0)
+
+    def draw(self, kind, step_voxels, frames):
+        """The picture as rows of RGB in [0, 1], top row first, and the seconds of each of `frames` further frames."""
+        mapper = mapper_of(kind, step_voxels * min(self.volume.GetSpacing()))
+        mapper.SetInputData(self.volume)
+        actor = vtk.vtkVolume()
+        actor.SetMapper(mapper)
+        actor.SetProperty(look_of(self.described["transfer_function"]))
+        renderer = vtk.vtkRenderer()
+        renderer.SetBackground(self.described.get("background", (0, 0, 0)))
+        renderer.AddVolume(actor)
+        camera = self.place_camera(renderer)
+        window = vtk.vtkRenderWindow()
+        window.SetOffScreenRendering(True)
+        window.SetMultiSamples(0)
+        window.SetSize(self.described["size"])
+        window.AddRenderer(renderer)
+
+        self.finish_frame(window)
+        picture, seconds = picture_of(window), []
+        for _ in range(frames):
+            camera.Azimuth(TURN_DEGREES)
+            start = time.perf_counter()
+            self.finish_frame(window)
+            seconds.append(time.perf_counter() - start)
+        window.Finalize()
+        return picture, seconds
+
+    def place_camera(self, renderer):
+        camera, described = renderer.GetActiveCamera(), self.described["camera"]
+        camera.SetPosition(described["eye"])
+        camera.SetFocalPoint(described["target"])
+        camera.SetViewUp(described["up"])
+        if described.get("projection") == "orthographic":
+            camera.ParallelProjectionOn()
+            camera.SetParallelScale(described["height"] / 2)
+        else:
+            camera.SetViewAngle(described["fov_y_deg"])
+        renderer.ResetCameraClippingRange()
+        return camera
+
+    @staticmethod
+    def finish_frame(window):
+        window.Render()
+        window.WaitForCompletion()
+
+    def errors(self, picture):
+        truths = {"reference": self.reference, "vtk_converged": self.converged}
+        return {name: error(picture, truth) for name, truth in truths.items() if truth is not None}
+
+
+def picture_of(window):
+    capture = vtk.vtkWindowToImageFilter()
+    capture.SetInput(window)
+    capture.SetInputBufferTypeToRGB()
+    capture.ReadFrontBufferOff()
+    capture.Update()
+    image = capture.GetOutput()
+    width, height, _ = image.GetDimensions()
+    return vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 3)[::-1] / 255.0
+
+
+def error(picture, truth):
+    difference = picture - truth
+    return {"rmse": float(np.sqrt(np.mean(difference**2))), "max": float(np.abs(difference).max())}
+
+
+def probe():
+    window = vtk.vtkRenderWindow()
+    window.SetOffScreenRendering(True)
+    window.Render()
+    lines = window.ReportCapabilities().splitlines()
+    device = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("OpenGL renderer string")), "")
+    return {"vtk": vtk.vtkVersion.GetVTKVersion(), "window": window.GetClassName(), "device": device}
+
+
+def main():
+    scene = None
+    for line in sys.stdin:
+        request = json.loads(line)
+        if request["do"] == "probe":
+            reply = probe()
+        elif request["do"] == "load":
+            scene = Scene(request["scene"], request["data"], request["reference"])
+            reply = {"name": scene.described["name"], "dims": scene.volume.GetDimensions()}
+        else:
+            picture, seconds = scene.draw(request["mapper"], request["step"], request["frames"])
+            reply = {"seconds": seconds, "errors": scene.errors(picture)}
+        print(json.dumps(reply), flush=True)
+
+
+if __name__ == "__main__":
+    main()
