@@ -18,7 +18,7 @@ const SIDE: u32 = 320;
 const FRAMES: usize = 5;
 
 /// Fractions of the value range.
-const TOLERANCES: [f64; 2] = [0.1, 0.5];
+const TOLERANCES: [f64; 2] = [0.2, 0.5];
 
 /// A generated volume and how it is shown.
 struct Scene {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use volery::fit::{self, Direction};
+use volery::info::number;
 use volery::io::transfer::TransferOptions;
 use volery::io::{read_transfer, write_atomically};
 use volery::output::{ErrorMap, write_image};
@@ -146,6 +147,7 @@ fn notes(input: &Input, session: &Session, view: &View) -> Result<(), Failure> {
     }
     let [low, high] = session.value_range();
     if view.transfer.is_transparent(low, high) {
+        let [low, high] = [low, high].map(number);
         say(format_args!(
             "note: the transfer function is transparent for all values of the file, {low} to {high}"
         ))?;

@@ -117,6 +117,34 @@ impl Backend for SoftwareBackend {
     }
 }
 
+#[cfg(test)]
+mod tests {
+    use volery_frame::conformance;
+
+    use super::*;
+
+    /// Every instruction set of this machine but the best, which `tests/conformance.rs` runs.
+    fn lesser_levels() -> Vec<Level> {
+        let best = Level::new();
+        #[cfg(target_arch = "x86_64")]
+        let levels =
+            [best.as_avx2().map(Level::Avx2), best.as_sse4_2().map(Level::Sse4_2), Some(Level::baseline())];
+        #[cfg(not(target_arch = "x86_64"))]
+        let levels = [Some(Level::baseline())];
+        levels.into_iter().flatten().collect()
+    }
+
+    #[test]
+    fn every_instruction_set_passes_the_conformance_suite() {
+        for level in lesser_levels() {
+            for (name, property) in conformance::ALL {
+                println!("{level:?}: {name}");
+                property(&mut SoftwareBackend { level, volume: None });
+            }
+        }
+    }
+}
+
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,8 +1,8 @@
 //! Which backend draws.
 //!
 //! `Auto` takes a real GPU; without one it takes the software executor, also where a CPU device pretends to
-//! be a GPU: on two cores Mesa's llvmpipe took several times as long for the same picture (`cargo xtask bench
-//! peers` prints both), and both use the same cores.
+//! be a GPU: on two cores Mesa's llvmpipe took two to three times as long for the same pictures (`cargo xtask
+//! bench peers` prints both), and both use the same cores.
 
 use std::path::Path;
 

@@ -82,7 +82,7 @@ impl Info {
 /// A few lines for people, the histogram as bars on a logarithmic scale.
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let times = |values: &[f64; 3]| values.map(|value| value.to_string()).join(" x ");
+        let times = |values: &[f64; 3]| values.map(number).join(" x ");
         writeln!(f, "kind      {}, {}", self.kind, self.format)?;
         writeln!(f, "dims      {}", self.dims.map(|n| n.to_string()).join(" x "))?;
         writeln!(f, "type      {}", self.scalar)?;
@@ -91,12 +91,12 @@ impl fmt::Display for Info {
         if let Some(array) = &self.array {
             writeln!(f, "array     {}", array.escape_debug())?;
         }
-        for (number, channel) in self.channels.iter().enumerate() {
+        for (index, channel) in self.channels.iter().enumerate() {
             if self.channels.len() > 1 {
-                writeln!(f, "channel   {number}")?;
+                writeln!(f, "channel   {index}")?;
             }
             match channel.range {
-                Some([low, high]) => writeln!(f, "range     {low} to {high}")?,
+                Some([low, high]) => writeln!(f, "range     {} to {}", number(low), number(high))?,
                 None => writeln!(f, "range     none, every sample is blank")?,
             }
             if channel.blank > 0 {
@@ -110,10 +110,35 @@ impl fmt::Display for Info {
     }
 }
 
+/// A number for people: without the hundreds of zeros that very large and very small ones have.
+pub fn number(value: f64) -> String {
+    let plain = value == 0.0 || (1e-5..1e15).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
 /// One character per bin: a blank for none, else one of eight heights, logarithmic.
 fn bars(counts: &[u64]) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let top = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
     let height = |count: u64| (7.0 * (count as f64).ln_1p() / top.ln_1p()).round() as usize;
     counts.iter().map(|&count| if count == 0 { ' ' } else { BARS[height(count)] }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(
+            [0.0, -3.0, 0.15625, 1e300, 5e-324].map(number),
+            ["0", "-3", "0.15625", "1e300", "5e-324"]
+        );
+    }
+
+    #[test]
+    fn bars_tell_none_from_few() {
+        assert_eq!(bars(&[0, 1, 1_000_000]), " ▁█");
+        assert_eq!(bars(&[]), "");
+    }
 }

@@ -90,7 +90,7 @@ pub enum OpenError {
     #[error("raycast: every sample is blank, expected some finite values")]
     Blank,
     /// Values so far apart that their difference is no number.
-    #[error("raycast: values from {} to {}, expected a range below 1.8e308", .range[0], .range[1])]
+    #[error("raycast: values from {:e} to {:e}, expected a range below 1.8e308", .range[0], .range[1])]
     TooWide {
         /// Smallest and largest value.
         range: [f64; 2],

@@ -11,7 +11,7 @@ use crate::adapter::{self, OpenError};
 use crate::gpu::{Failure, Gpu};
 use crate::picture::{Band, rows_per_band};
 use crate::pool::Pool;
-use crate::raycast::{Raycast, Resources, transfer_texture, units_texture};
+use crate::raycast::{Raycast, Resources, Variant, transfer_texture, units_texture};
 use crate::units::{Matter, Units};
 use crate::view::shader_frame;
 
@@ -119,6 +119,8 @@ impl WgpuBackend {
             picture: &band.pixels,
         };
         let bound = gpu.checked(|| self.raycast.bind(gpu, &resources))?;
+        let variant = Variant { has_blanks: prepared.has_blanks, is_packed: pool.is_packed() };
+        let pipeline = self.raycast.pipeline(gpu, variant)?;
         let mut shader_frame = shader_frame(frame, pool.layout(), &prepared.units, pool);
         let mut seconds = Some(0.0);
         for first_row in (0..height).step_by(rows as usize) {
@@ -127,7 +129,7 @@ impl WgpuBackend {
             let num_pixels = width as usize * (end_row - first_row) as usize;
             self.raycast.set_frame(gpu, &shader_frame);
             let band_seconds = band.run(gpu, num_pixels, &mut pixels, |pass| {
-                self.raycast.encode(pass, &bound, &shader_frame, prepared.has_blanks);
+                Raycast::encode(pass, &pipeline, &bound, &shader_frame);
             })?;
             seconds = seconds.zip(band_seconds).map(|(sum, band)| sum + band);
         }

@@ -5,7 +5,7 @@ use volery_frame::{Brick, Texels};
 
 /// Cells per edge of a block that suit: smaller ones follow the matter more closely, larger ones are left less
 /// often.
-const GOOD_BLOCK: f64 = 8.0;
+const GOOD_BLOCK: f64 = 4.0;
 
 /// Cells per edge of a block: the divisor of a brick's that is nearest to the good size.
 pub(crate) fn block_cells(brick_cells: u32) -> u32 {

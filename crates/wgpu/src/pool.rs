@@ -7,11 +7,14 @@
 use std::collections::HashMap;
 
 use volery_frame::{Brick, BrickId, TexelType, Texels, UploadError, VolumeLayout};
-use volery_shaders::raycast::{BLANK, CELLS_MASK, SLOT_MASK};
+use volery_shaders::raycast::{BLANK, CELLS_MASK, CELLS_PER_WORD, SLOT_MASK};
 
 use crate::blocks::Summary;
 use crate::gpu::{Failure, Gpu};
 use crate::units::Resident;
+
+/// Format of texels of 8 bits: words of four successive z.
+const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
 /// Bytes handed to the device before it is asked to take them: bounds the memory of copies under way.
 const BYTES_IN_FLIGHT: usize = 32 << 20;
@@ -31,7 +34,7 @@ pub(crate) struct Pool {
 /// The shape of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Slot {
-    /// Samples of a brick per axis.
+    /// Samples of a brick along x and y.
     edge: u32,
     /// Slices side by side.
     pub(crate) slices_per_row: u32,
@@ -47,9 +50,9 @@ struct Atlas {
 
 impl Slot {
     /// As few rows of slices as textures of this width allow.
-    fn new(edge: u32, max_width: u32) -> Self {
-        let slices_per_row = (max_width / edge).clamp(1, edge);
-        let size = [slices_per_row * edge, edge.div_ceil(slices_per_row) * edge];
+    fn new(edge: u32, num_slices: u32, max_width: u32) -> Self {
+        let slices_per_row = (max_width / edge).clamp(1, num_slices);
+        let size = [slices_per_row * edge, num_slices.div_ceil(slices_per_row).saturating_mul(edge)];
         Self { edge, slices_per_row, size }
     }
 }
@@ -71,7 +74,10 @@ impl Pool {
     /// An empty pool for bricks of a layout.
     pub(crate) fn new(gpu: &Gpu, layout: &VolumeLayout) -> Result<Self, UploadError> {
         let max_dimension = gpu.device.limits().max_texture_dimension_2d;
-        let slot = Slot::new(layout.brick_cells.saturating_add(1), max_dimension);
+        let edge = layout.brick_cells.saturating_add(1);
+        let is_packed = false;
+        let num_slices = if is_packed { layout.brick_cells.div_ceil(CELLS_PER_WORD).max(1) } else { edge };
+        let slot = Slot::new(edge, num_slices, max_dimension);
         if !(1..=CELLS_MASK).contains(&layout.brick_cells) || slot.size.iter().any(|&n| n > max_dimension) {
             let found = layout.brick_cells;
             return Err(UploadError::Device(format!(
@@ -102,6 +108,11 @@ impl Pool {
 
     pub(crate) fn generation(&self) -> u64 {
         self.generation
+    }
+
+    /// Whether texels are packed into words.
+    pub(crate) fn is_packed(&self) -> bool {
+        self.format == PACKED
     }
 
     pub(crate) fn slot(&self) -> Slot {
@@ -204,8 +215,9 @@ impl Pool {
         let [width, height] = self.slot.size;
         let slot_bytes = u64::from(width) * u64::from(height) * self.texel_bytes();
         let max_rows = (limits.max_texture_dimension_2d / height).min(SLOT_MASK + 1);
-        let slots_per_layer = capacity.min(max_rows).max(1);
-        let layers = capacity.div_ceil(slots_per_layer);
+        // Layers of equal height waste least.
+        let layers = capacity.div_ceil(max_rows.max(1)).max(1);
+        let slots_per_layer = capacity.div_ceil(layers).max(1);
         let max_layers = limits.max_texture_array_layers.min(SLOT_MASK + 1);
         if layers > max_layers {
             let max = u64::from(max_rows) * u64::from(max_layers) * slot_bytes;
@@ -289,6 +301,35 @@ impl Slot {
             folded[first..first + row_length].iter_mut().zip(row).for_each(|(to, &from)| *to = convert(from));
         }
         bytemuck::cast_slice(&folded).to_vec()
+    }
+
+    /// The same for words of packed texels: each texel goes into the word that it begins and into the one that
+    /// it ends.
+    fn pack(self, samples: [u32; 3], texels: &[u8]) -> Vec<u8> {
+        let [width, height] = self.size.map(|n| n as usize);
+        let mut words = vec![0_u32; width * height];
+        let [row_length, num_rows, num_slices] = samples.map(|n| n as usize);
+        let (edge, slices_per_row) = (self.edge as usize, self.slices_per_row as usize);
+        let cells_per_word = CELLS_PER_WORD as usize;
+        for (index, row) in texels.chunks_exact(row_length).enumerate() {
+            let (y, z) = (index % num_rows, index / num_rows);
+            let mut add = |slice: usize, shift: usize| {
+                let first = (slice / slices_per_row * edge + y) * width + slice % slices_per_row * edge;
+                let words = words[first..first + row_length].iter_mut();
+                words.zip(row).for_each(|(word, &texel)| *word |= u32::from(texel) << shift);
+            };
+            let (slice, place) = (z / cells_per_word, z % cells_per_word);
+            // The brick's last sample begins no cell.
+            if z + 1 < num_slices {
+                add(slice, 8 * place);
+            }
+            if place == 0 && z > 0 {
+                add(slice - 1, 8 * cells_per_word);
+            } else if z + 1 == num_slices && z > 0 {
+                add(slice, 8 * place);
+            }
+        }
+        bytemuck::cast_slice(&words).to_vec()
     }
 }
 

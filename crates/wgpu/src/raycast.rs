@@ -1,5 +1,6 @@
 //! The pipeline that casts rays: its layouts from the shader's reflection, its textures, its commands.
 
+use std::collections::HashMap;
 use std::num::NonZeroU64;
 
 use volery_frame::IntegratedTransfer;
@@ -8,13 +9,25 @@ use volery_shaders::{Binding, BindingKind, Dimension, TexelKind, raycast};
 use crate::gpu::{Failure, Gpu};
 use crate::units::Units;
 
-/// The pipeline in its two forms: with and without blank texels.
+/// What the shader is told when it is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Variant {
+    /// Texels may be blank.
+    pub(crate) has_blanks: bool,
+    /// The atlas holds packed words.
+    pub(crate) is_packed: bool,
+}
+
+/// The pipeline in all its variants.
 pub(crate) struct Raycast {
     layout: wgpu::BindGroupLayout,
-    plain: wgpu::ComputePipeline,
-    with_blanks: wgpu::ComputePipeline,
+    module: wgpu::ShaderModule,
+    /// Made when first needed.
+    pipelines: HashMap<Variant, wgpu::ComputePipeline>,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
+    /// Stand for the atlas of the kind that a frame does not have.
+    no_texels: [wgpu::Texture; 2],
 }
 
 /// What one frame binds.
@@ -40,8 +53,7 @@ impl Raycast {
                 source: wgpu::ShaderSource::Wgsl(std::env::var("VOLERY_WGSL").map(|p| std::fs::read_to_string(p).unwrap().into()).unwrap_or(raycast::SOURCE.into())),
             });
             Self {
-                plain: pipeline(device, &layout, &module, false),
-                with_blanks: pipeline(device, &layout, &module, true),
+                pipelines: HashMap::new(),
                 frame: device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("volery frame"),
                     size: size_of::<raycast::Frame>() as u64,
@@ -52,6 +64,12 @@ impl Raycast {
                     label: Some("volery atlas"),
                     ..Default::default()
                 }),
+                no_texels: [wgpu::TextureFormat::R8Unorm, wgpu::TextureFormat::R32Uint].map(|format| {
+                    let dims = [1, 1, 1];
+                    let bytes = &[0; 4][..format.block_copy_size(None).unwrap_or(1) as usize];
+                    texture(gpu, "volery no texels", wgpu::TextureDimension::D2, format, dims, bytes)
+                }),
+                module,
                 layout,
             }
         })
@@ -63,12 +81,17 @@ impl Raycast {
             texture.create_view(&descriptor)
         };
         let units = view(resources.units, wgpu::TextureViewDimension::D3);
-        let atlas = view(resources.atlas, wgpu::TextureViewDimension::D2Array);
+        let is_packed = resources.atlas.format() == wgpu::TextureFormat::R32Uint;
+        let [no_floats, no_words] = &self.no_texels;
+        let (floats, words) = if is_packed { (no_floats, resources.atlas) } else { (resources.atlas, no_words) };
+        let atlas = view(floats, wgpu::TextureViewDimension::D2Array);
+        let packed_atlas = view(words, wgpu::TextureViewDimension::D2Array);
         let transfer = view(resources.transfer, wgpu::TextureViewDimension::D2);
         let resource = |binding: &Binding| match binding.name {
             "frame" => self.frame.as_entire_binding(),
             "units" => wgpu::BindingResource::TextureView(&units),
             "atlas" => wgpu::BindingResource::TextureView(&atlas),
+            "packed_atlas" => wgpu::BindingResource::TextureView(&packed_atlas),
             "atlas_sampler" => wgpu::BindingResource::Sampler(&self.sampler),
             "transfer" => wgpu::BindingResource::TextureView(&transfer),
             // A binding that the shader gains and this does not know fails as one of the wrong kind.
@@ -90,15 +113,24 @@ impl Raycast {
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
     }
 
+    /// The pipeline of a variant, compiled if this is the first frame that needs it.
+    pub(crate) fn pipeline(&mut self, gpu: &Gpu, variant: Variant) -> Result<wgpu::ComputePipeline, Failure> {
+        if let Some(pipeline) = self.pipelines.get(&variant) {
+            return Ok(pipeline.clone());
+        }
+        let made = gpu.checked(|| pipeline(&gpu.device, &self.layout, &self.module, variant))?;
+        self.pipelines.insert(variant, made.clone());
+        Ok(made)
+    }
+
     /// Casts the rays of `frame`'s band of rows.
     pub(crate) fn encode(
-        &self,
         pass: &mut wgpu::ComputePass<'_>,
+        pipeline: &wgpu::ComputePipeline,
         bound: &wgpu::BindGroup,
         frame: &raycast::Frame,
-        has_blanks: bool,
     ) {
-        pass.set_pipeline(if has_blanks { &self.with_blanks } else { &self.plain });
+        pass.set_pipeline(pipeline);
         pass.set_bind_group(0, bound, &[]);
         let rows = frame.end_row - frame.first_row;
         pass.dispatch_workgroups(frame.width.div_ceil(raycast::TILE), rows.div_ceil(raycast::TILE), 1);
@@ -109,20 +141,24 @@ fn pipeline(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     module: &wgpu::ShaderModule,
-    has_blanks: bool,
+    variant: Variant,
 ) -> wgpu::ComputePipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("volery raycast"),
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
+    let Variant { has_blanks, is_packed } = variant;
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(if has_blanks { "volery raycast, blanks" } else { "volery raycast" }),
+        label: Some(&format!("volery raycast, {variant:?}")),
         layout: Some(&layout),
         module,
         entry_point: Some(raycast::MAIN),
         compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &[(raycast::HAS_BLANKS, f64::from(has_blanks))],
+            constants: &[
+                (raycast::HAS_BLANKS, f64::from(has_blanks)),
+                (raycast::IS_PACKED, f64::from(is_packed)),
+            ],
             ..Default::default()
         },
         cache: None,

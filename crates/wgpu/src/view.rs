@@ -71,6 +71,8 @@ pub(crate) fn shader_frame(
         num_bins: frame.transfer.num_bins() as f32,
         slices_per_row: pool.slot().slices_per_row as f32,
         slot_height: pool.slot().size[1] as f32,
+        rows_per_slice: 1.0 / pool.slot().slices_per_row as f32,
+        bricks_per_cell: 1.0 / layout.brick_cells as f32,
         ..bytemuck::Zeroable::zeroed()
     }
 }

@@ -42,15 +42,21 @@ struct Frame {
     // Of a brick in the atlas: slices side by side, and rows of texels.
     slices_per_row: f32,
     slot_height: f32,
+    rows_per_slice: f32,
+    bricks_per_cell: f32,
 }
 
 // Whether texels may be blank; then no value is carried from one cell to the next.
 override HAS_BLANKS: bool = false;
+// Whether texels are in `packed_atlas`.
+override IS_PACKED: bool = false;
 
 // Texels from here on are blank.
 const BLANK: f32 = 1e38;
 // Optical depth to the base 2 at which a ray stops: it lets 1/4096 of the light through.
 const OPAQUE_DEPTH: f32 = 12.0;
+// Cells along z whose corners a word of packed texels holds.
+const CELLS_PER_WORD: u32 = 3;
 // Pixels per edge of a workgroup's tile.
 const TILE: u32 = 8;
 // In a unit's first word: set where it holds matter; then come the level, and the layer and row of the brick's
@@ -72,9 +78,12 @@ const CELLS_MASK: u32 = 1023;
 // A brick's slices of equal z lie side by side, in rows of `slices_per_row`; bricks one below the other, then
 // in layers. So a brick is compact in memory, and a gather reads four corners of a cell at once.
 @group(0) @binding(2) var atlas: texture_2d_array<f32>;
-@group(0) @binding(3) var atlas_sampler: sampler;
-@group(0) @binding(4) var transfer: texture_2d<f32>;
-@group(0) @binding(5) var<storage, read_write> picture: array<f32>;
+// The same for texels of 8 bits: a word holds four of successive z, the last of them again the first of the next
+// word, so that one gather reads a whole cell.
+@group(0) @binding(3) var packed_atlas: texture_2d_array<u32>;
+@group(0) @binding(4) var atlas_sampler: sampler;
+@group(0) @binding(5) var transfer: texture_2d<f32>;
+@group(0) @binding(6) var<storage, read_write> picture: array<f32>;
 
 struct Ray {
     start: vec3f,
@@ -125,13 +134,20 @@ fn ray_of_pixel(pixel: vec2u) -> Ray {
 
 // Where a gather reads the corners of a cell in the slice z of a brick.
 fn slice_place(corner: vec2f, z: f32) -> vec2f {
-    let row = floor((z + 0.5) / frame.slices_per_row);
+    let row = floor((z + 0.5) * frame.rows_per_slice);
     let edge = f32(frame.brick_cells + 1u);
     return (corner + edge * vec2f(z - row * frame.slices_per_row, row)) * frame.atlas_scale;
 }
 
 fn corners_of_cell(slot: vec2u, cell: vec3f) -> Corners {
     let corner = vec2f(0.0, f32(slot.y) * frame.slot_height) + cell.xy + 1.0;
+    if IS_PACKED {
+        let word = floor((cell.z + 0.5) * (1.0 / f32(CELLS_PER_WORD)));
+        let words = textureGather(0, packed_atlas, atlas_sampler, slice_place(corner, word), slot.x);
+        let shift = vec4u(8u * u32(cell.z - f32(CELLS_PER_WORD) * word));
+        let low = vec4f((words >> shift) & vec4u(255u));
+        return Corners(low, vec4f((words >> (shift + 8u)) & vec4u(255u)) - low);
+    }
     let low = textureGather(0, atlas, atlas_sampler, slice_place(corner, cell.z), slot.x);
     let high = textureGather(0, atlas, atlas_sampler, slice_place(corner, cell.z + 1.0), slot.x);
     return Corners(low, high - low);
@@ -157,10 +173,13 @@ fn integrate(light: ptr<function, Light>, from_end: End, bin: i32, depth_scale: 
     let to_bin = bin + select(0, 1, is_flat);
     let sums = textureLoad(transfer, vec2i(to_bin, 0), 0);
     let change = sums - from_end.sums;
-    let depth = (*light).depth + depth_scale * change.w / f32(to_bin - from_end.bin);
+    // One division for two: by the bins passed and by the change of depth.
+    let num_bins = f32(to_bin - from_end.bin);
+    let inverse = 1.0 / (num_bins * select(change.w, 1.0, change.w == 0.0));
+    let depth = (*light).depth + depth_scale * change.w * (change.w * inverse);
     let transmittance = exp2(-depth);
     // The differences of transmittance add up to exactly what is missing behind.
-    let share = ((*light).transmittance - transmittance) / select(change.w, 1.0, change.w == 0.0);
+    let share = ((*light).transmittance - transmittance) * (num_bins * inverse);
     (*light).color += share * change.rgb;
     (*light).depth = depth;
     (*light).transmittance = transmittance;
@@ -188,13 +207,21 @@ fn light_along(ray: Ray) -> vec3f {
         let words = textureLoad(units, vec3i(unit), 0).xy;
         let is_occupied = (words.x & OCCUPIED) != 0u;
         let level = (words.x >> LEVEL_SHIFT) & LEVEL_MASK;
-        let scale = f32(1u << level);
+        // Powers of two, from their exponents.
+        let scale = bitcast<f32>((127u + level) << 23u);
+        let inverse_scale = bitcast<f32>((127u - level) << 23u);
         // Of the brick and its cell: lower corner.
         let brick_size = scale * f32(frame.brick_cells);
-        let brick_low = floor((place + 0.5) / brick_size) * brick_size;
-        let cell = floor((place + 0.5 - brick_low) / scale);
+        let brick_low = floor((place + 0.5) * (frame.bricks_per_cell * inverse_scale)) * brick_size;
+        let cell = floor((place + 0.5 - brick_low) * inverse_scale);
         let cells = vec3f((vec3u(words.y) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));
         let is_visible = is_occupied && all(cell < cells);
+        let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
+        let corners = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
+        let peak = max(corners.low, corners.low + corners.rise);
+        let is_blank = HAS_BLANKS && max(max(peak.x, peak.y), max(peak.z, peak.w)) >= BLANK;
+        let is_matter = is_visible && !is_blank;
+
         // The box that this round leaves.
         let radius = f32(words.x) - 1.0;
         let low = select((unit - radius) * unit_size, brick_low + cell * scale, is_occupied);
@@ -202,18 +229,16 @@ fn light_along(ray: Ray) -> vec3f {
         let faces = (mix(low, high, ray.rising) - ray.start) * ray.inverse;
         let exit = max(min(smallest(faces), t_end), t);
         // A round without length finds the value where a run of cells begins.
-        let is_start = is_visible && level != end_level;
+        let is_start = is_matter && level != end_level;
         let t_next = select(exit, t, is_start);
 
-        let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
-        let corners = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
         let origin = ray.start - low;
-        let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t / 1.0, is_visible);
-        let middle = bin_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) / scale);
-        let last = bin_at(corners, (origin + t_next * ray.direction) / scale);
+        let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);
+        let middle = bin_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) * inverse_scale);
+        let last = bin_at(corners, (origin + t_next * ray.direction) * inverse_scale);
         end = integrate(&light, end, middle, depth);
         end = integrate(&light, end, last, depth);
-        end_level = select(NO_LEVEL, level, is_visible);
+        end_level = select(NO_LEVEL, level, is_matter);
 
         let inside = clamp(floor(ray.start + t_next * ray.direction), low, high - 1.0);
         let beyond = mix(low - 1.0, high, ray.rising);

@@ -57,10 +57,10 @@ fn extremes_of_extinction_are_exact(choice: BackendChoice, test: &str) {
         let found = distance(&format!("{choice:?}, opacity {opacity:e}"), &drawn, &truth(&grid, &view));
         // A backend may leave a ray that lets 1/4096 through.
         at_most("largest difference", found.max, 1.0 / 4096.0 + 2e-5);
-        // Light from nearly nothing must not be lost: relative to the exact picture.
-        if (1e-8..1e-3).contains(&opacity) {
+        // Light of nearly nothing must not be lost: it may differ in its own digits, or in those of an f32 near 1.
+        if opacity < 1e-3 {
             let brightest = drawn.pixels().iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
-            at_most("relative to the brightest", found.max / brightest, 1e-5);
+            at_most("faint light", found.max, 1e-5 * brightest + f64::from(f32::EPSILON));
         }
     }
 }

@@ -84,7 +84,7 @@ fn picture_chunks(bytes: &[u8]) -> Result<Vec<u8>, Problem> {
         };
         let name = &head[4..];
         let is_palette = is_indexed && matches!(name, b"PLTE" | b"tRNS");
-        if name == b"PLTE" && !matches!((length - 12) / 3, 1..=256 if length % 3 == 0) {
+        if name == b"PLTE" && !matches!((length - 12) / 3, 1..=256 if length.is_multiple_of(3)) {
             let expected = "1 to 256 colours of 3 bytes";
             return Err(Problem::field("PLTE", format!("{} bytes", length - 12), expected));
         }

@@ -24,8 +24,11 @@ use volery_scene::{Camera, TransferFunction};
 
 use crate::texels::{Buffer, Encoding};
 
-/// Cells of a brick per axis. With 32, a brick of bytes is 36 kB, of which shared boundaries are 9 %.
-pub const BRICK_CELLS: usize = 16;
+/// Cells of a brick per axis: a brick of bytes is 36 kB then, of which shared boundaries are 9 %.
+///
+/// With 16, the software executor drew engine, heptane and the MRI head 4 to 18 % slower in full resolution,
+/// holding 2 to 21 % fewer bytes; a tolerance of 0.05 then halved the bytes of heptane, where 32 saves a fifth.
+pub const BRICK_CELLS: usize = 32;
 
 /// Texels on their way to the backend at one time.
 pub const BATCH_BYTES: usize = 16 << 20;
