@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 
 use naga::proc::Layouter;
 use naga::{
-    AddressSpace, ArraySize, Expression, Handle, ImageClass, ImageDimension, Literal, Module, Scalar, ScalarKind, StorageAccess,
-    StructMember, Type, TypeInner, VectorSize,
+    AddressSpace, ArraySize, Expression, Handle, ImageClass, ImageDimension, Literal, Module, Scalar,
+    ScalarKind, StorageAccess, StructMember, Type, TypeInner, VectorSize,
 };
 
 use crate::Shader;
@@ -169,7 +169,9 @@ fn bindings(text: &mut String, shader: &Shader, layouter: &Layouter) -> Result<(
                     ScalarKind::Uint => "Uint",
                     _ => return Err(unknown(shader, name)),
                 };
-                format!("Texture {{ dimension: crate::Dimension::{dimension}, texel: crate::TexelKind::{texel} }}")
+                format!(
+                    "Texture {{ dimension: crate::Dimension::{dimension}, texel: crate::TexelKind::{texel} }}"
+                )
             }
             _ => return Err(unknown(shader, name)),
         };

@@ -112,7 +112,9 @@ impl IntegratedTransfer {
         let last = self.num_bins();
         // `as` saturates: below the range is bin 0.
         let first = (low_bin.floor() as usize).min(last);
-        low_bin > high_bin || low_bin.is_nan() || self.next_opaque[first] > (high_bin.max(0.0) as usize).min(last) as u16
+        low_bin > high_bin
+            || low_bin.is_nan()
+            || self.next_opaque[first] > (high_bin.max(0.0) as usize).min(last) as u16
     }
 }
 

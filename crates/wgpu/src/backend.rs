@@ -2,8 +2,8 @@
 
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Device, DeviceKind, DrawError, Drawn, Frame, Image, IntegratedTransfer, PlacedBrick,
-    UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Device, DeviceKind, DrawError, Drawn, Frame, Image, IntegratedTransfer,
+    PlacedBrick, UploadError, VolumeLayout,
 };
 use volery_shaders::raycast;
 
@@ -11,7 +11,7 @@ use crate::adapter::{self, OpenError};
 use crate::gpu::{Failure, Gpu};
 use crate::picture::{Band, rows_per_band};
 use crate::pool::Pool;
-use crate::raycast::{Raycast, Resources, Variant, transfer_texture, units_texture};
+use crate::raycast::{Raycast, Resources, transfer_texture, units_texture};
 use crate::units::{Matter, Units};
 use crate::view::shader_frame;
 
@@ -57,7 +57,8 @@ impl WgpuBackend {
 
     fn open(kind: Option<DeviceKind>) -> Result<Self, OpenError> {
         let gpu = adapter::open(kind)?;
-        let fail = |failure: Failure| OpenError::Device { name: gpu.info.name.clone(), reason: failure.to_string() };
+        let fail =
+            |failure: Failure| OpenError::Device { name: gpu.info.name.clone(), reason: failure.to_string() };
         let raycast = Raycast::new(&gpu).map_err(fail)?;
         Ok(Self { gpu, raycast, pool: None, prepared: None, band: None })
     }
@@ -74,11 +75,16 @@ impl WgpuBackend {
             return Ok(());
         }
         let (layout, resident) = (pool.layout(), pool.resident());
-        let units = Units::new(&Matter { layout, resident, transfer: frame.transfer, slots_per_layer: pool.slots_per_layer() }, frame.bricks);
+        let units = Units::new(
+            &Matter { layout, resident, transfer: frame.transfer, slots_per_layer: pool.slots_per_layer() },
+            frame.bricks,
+        );
         let max = self.gpu.device.limits().max_texture_dimension_3d;
         if units.dims.iter().any(|&n| n > max) {
             let [x, y, z] = units.dims;
-            return Err(Failure::Other(format!("volume of {x} x {y} x {z} units, expected at most {max} per axis")));
+            return Err(Failure::Other(format!(
+                "volume of {x} x {y} x {z} units, expected at most {max} per axis"
+            )));
         }
         let (units_texture, transfer_texture) = self
             .gpu
@@ -119,8 +125,7 @@ impl WgpuBackend {
             picture: &band.pixels,
         };
         let bound = gpu.checked(|| self.raycast.bind(gpu, &resources))?;
-        let variant = Variant { has_blanks: prepared.has_blanks, is_packed: pool.is_packed() };
-        let pipeline = self.raycast.pipeline(gpu, variant)?;
+        let pipeline = self.raycast.pipeline(gpu, prepared.has_blanks)?;
         let mut shader_frame = shader_frame(frame, pool.layout(), &prepared.units, pool);
         let mut seconds = Some(0.0);
         for first_row in (0..height).step_by(rows as usize) {

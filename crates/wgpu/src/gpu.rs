@@ -69,11 +69,12 @@ impl Gpu {
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         let result = calls();
         // Scopes are a stack: the last one pushed is the first to go.
-        let errors = [internal.pop(), validation.pop(), memory.pop()].map(|scope| match pollster::block_on(scope) {
-            None => None,
-            Some(wgpu::Error::OutOfMemory { .. }) => Some(Failure::OutOfMemory),
-            Some(error) => Some(Failure::Other(one_line(&error.to_string()))),
-        });
+        let errors =
+            [internal.pop(), validation.pop(), memory.pop()].map(|scope| match pollster::block_on(scope) {
+                None => None,
+                Some(wgpu::Error::OutOfMemory { .. }) => Some(Failure::OutOfMemory),
+                Some(error) => Some(Failure::Other(one_line(&error.to_string()))),
+            });
         let stray = self.stray.lock().ok().and_then(|mut stray| stray.take()).map(Failure::Other);
         // Out of memory first: the others may follow from it.
         match errors.into_iter().rev().flatten().chain(stray).next() {

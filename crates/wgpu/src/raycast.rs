@@ -1,6 +1,5 @@
 //! The pipeline that casts rays: its layouts from the shader's reflection, its textures, its commands.
 
-use std::collections::HashMap;
 use std::num::NonZeroU64;
 
 use volery_frame::IntegratedTransfer;
@@ -9,25 +8,14 @@ use volery_shaders::{Binding, BindingKind, Dimension, TexelKind, raycast};
 use crate::gpu::{Failure, Gpu};
 use crate::units::Units;
 
-/// What the shader is told when it is compiled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Variant {
-    /// Texels may be blank.
-    pub(crate) has_blanks: bool,
-    /// The atlas holds packed words.
-    pub(crate) is_packed: bool,
-}
-
-/// The pipeline in all its variants.
+/// The pipeline in its two forms: without blank texels and with them.
 pub(crate) struct Raycast {
     layout: wgpu::BindGroupLayout,
     module: wgpu::ShaderModule,
-    /// Made when first needed.
-    pipelines: HashMap<Variant, wgpu::ComputePipeline>,
+    /// Without and with blanks; compiled when first needed.
+    pipelines: [Option<wgpu::ComputePipeline>; 2],
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
-    /// Stand for the atlas of the kind that a frame does not have.
-    no_texels: [wgpu::Texture; 2],
 }
 
 /// What one frame binds.
@@ -47,13 +35,12 @@ impl Raycast {
                 label: Some("volery raycast"),
                 entries: &entries,
             });
-            #[allow(unsafe_code)]
-            let module = (|d| if std::env::var_os("UNCHECKED").is_some() { unsafe { device.create_shader_module_trusted(d, wgpu::ShaderRuntimeChecks::unchecked()) } } else { device.create_shader_module(d) })(wgpu::ShaderModuleDescriptor {
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(raycast::LABEL),
-                source: wgpu::ShaderSource::Wgsl(std::env::var("VOLERY_WGSL").map(|p| std::fs::read_to_string(p).unwrap().into()).unwrap_or(raycast::SOURCE.into())),
+                source: wgpu::ShaderSource::Wgsl(raycast::SOURCE.into()),
             });
             Self {
-                pipelines: HashMap::new(),
+                pipelines: [None, None],
                 frame: device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("volery frame"),
                     size: size_of::<raycast::Frame>() as u64,
@@ -63,11 +50,6 @@ impl Raycast {
                 sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                     label: Some("volery atlas"),
                     ..Default::default()
-                }),
-                no_texels: [wgpu::TextureFormat::R8Unorm, wgpu::TextureFormat::R32Uint].map(|format| {
-                    let dims = [1, 1, 1];
-                    let bytes = &[0; 4][..format.block_copy_size(None).unwrap_or(1) as usize];
-                    texture(gpu, "volery no texels", wgpu::TextureDimension::D2, format, dims, bytes)
                 }),
                 module,
                 layout,
@@ -81,17 +63,12 @@ impl Raycast {
             texture.create_view(&descriptor)
         };
         let units = view(resources.units, wgpu::TextureViewDimension::D3);
-        let is_packed = resources.atlas.format() == wgpu::TextureFormat::R32Uint;
-        let [no_floats, no_words] = &self.no_texels;
-        let (floats, words) = if is_packed { (no_floats, resources.atlas) } else { (resources.atlas, no_words) };
-        let atlas = view(floats, wgpu::TextureViewDimension::D2Array);
-        let packed_atlas = view(words, wgpu::TextureViewDimension::D2Array);
+        let atlas = view(resources.atlas, wgpu::TextureViewDimension::D2Array);
         let transfer = view(resources.transfer, wgpu::TextureViewDimension::D2);
         let resource = |binding: &Binding| match binding.name {
             "frame" => self.frame.as_entire_binding(),
             "units" => wgpu::BindingResource::TextureView(&units),
             "atlas" => wgpu::BindingResource::TextureView(&atlas),
-            "packed_atlas" => wgpu::BindingResource::TextureView(&packed_atlas),
             "atlas_sampler" => wgpu::BindingResource::Sampler(&self.sampler),
             "transfer" => wgpu::BindingResource::TextureView(&transfer),
             // A binding that the shader gains and this does not know fails as one of the wrong kind.
@@ -113,14 +90,14 @@ impl Raycast {
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
     }
 
-    /// The pipeline of a variant, compiled if this is the first frame that needs it.
-    pub(crate) fn pipeline(&mut self, gpu: &Gpu, variant: Variant) -> Result<wgpu::ComputePipeline, Failure> {
-        if let Some(pipeline) = self.pipelines.get(&variant) {
+    /// The pipeline of one form, compiled if this is the first frame that needs it.
+    pub(crate) fn pipeline(&mut self, gpu: &Gpu, has_blanks: bool) -> Result<wgpu::ComputePipeline, Failure> {
+        let made = &mut self.pipelines[usize::from(has_blanks)];
+        if let Some(pipeline) = made {
             return Ok(pipeline.clone());
         }
-        let made = gpu.checked(|| pipeline(&gpu.device, &self.layout, &self.module, variant))?;
-        self.pipelines.insert(variant, made.clone());
-        Ok(made)
+        let pipeline = gpu.checked(|| pipeline(&gpu.device, &self.layout, &self.module, has_blanks))?;
+        Ok(made.insert(pipeline).clone())
     }
 
     /// Casts the rays of `frame`'s band of rows.
@@ -141,24 +118,20 @@ fn pipeline(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     module: &wgpu::ShaderModule,
-    variant: Variant,
+    has_blanks: bool,
 ) -> wgpu::ComputePipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("volery raycast"),
         bind_group_layouts: &[Some(layout)],
         immediate_size: 0,
     });
-    let Variant { has_blanks, is_packed } = variant;
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(&format!("volery raycast, {variant:?}")),
+        label: Some(if has_blanks { "volery raycast, blanks" } else { "volery raycast" }),
         layout: Some(&layout),
         module,
         entry_point: Some(raycast::MAIN),
         compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &[
-                (raycast::HAS_BLANKS, f64::from(has_blanks)),
-                (raycast::IS_PACKED, f64::from(is_packed)),
-            ],
+            constants: &[(raycast::HAS_BLANKS, f64::from(has_blanks))],
             ..Default::default()
         },
         cache: None,

@@ -175,10 +175,13 @@ mod tests {
 
     #[test]
     fn distances_are_those_of_brute_force() {
-        for (dims, every) in [([7, 5, 9], 37), ([1, 1, 12], 5), ([16, 3, 1], 11), ([6, 6, 6], 1000), ([4, 4, 4], 1)] {
+        for (dims, every) in
+            [([7, 5, 9], 37), ([1, 1, 12], 5), ([16, 3, 1], 11), ([6, 6, 6], 1000), ([4, 4, 4], 1)]
+        {
             let num: usize = dims.iter().map(|&n| n as usize).product();
-            let words: Vec<_> =
-                (0..num).map(|i| if i % every == 2 % every { [OCCUPIED | 5, 9] } else { [MAX_DISTANCE, 0] }).collect();
+            let words: Vec<_> = (0..num)
+                .map(|i| if i % every == 2 % every { [OCCUPIED | 5, 9] } else { [MAX_DISTANCE, 0] })
+                .collect();
             let mut units = Units { unit_cells: 1, dims, words: words.clone() };
             units.measure_distances();
             let place = |i: usize| {

@@ -1,13 +1,11 @@
 // Casts one ray per pixel through the bricks of a volume.
 //
-// A ray runs through three grids. *Units* cover the volume evenly and say where it is empty and how far around;
-// a ray leaps over such space. A *block* is the part of a brick that is marched at a stretch. In a block the ray
-// visits the cells between samples: along a ray the trilinear field of a cell has no kinks, and the pieces
-// within a cell are integrated through the transfer function's antiderivative.
+// *Units* cover the volume evenly and say which brick is there, or how far around space is empty: a ray leaps
+// over such space. Elsewhere it visits the cells between samples: along a ray the trilinear field of a cell has no
+// kinks, and two pieces of each cell are integrated through the transfer function's antiderivative.
 //
-// Positions are in finest cells from the volume's lower corner until a block is entered, then in the brick's own
-// cells from the brick's lower corner. `t` is the way along the ray in finest cells, from a start that the CPU
-// chose near the volume, so that 32 bits do.
+// Positions are in finest cells from the volume's lower corner, `t` is the way along the ray in finest cells, from
+// a start that the CPU chose near the volume, so that 32 bits do.
 
 struct Frame {
     // The ray of image point (x, y) starts at `origin + x * origin_dx + y * origin_dy`, directions likewise.
@@ -20,16 +18,15 @@ struct Frame {
     first_row: u32,
     toward: vec3f,
     // Finest cells per edge of a unit.
-    unit_cells: u32,
+    unit_cells: f32,
     toward_dx: vec3f,
-    // A brick's own cells per edge of a block.
-    block_cells: u32,
+    units_per_cell: f32,
     toward_dy: vec3f,
-    // A brick's own cells per edge of a brick.
-    brick_cells: u32,
+    // A brick's own cells per edge of a brick, and the same the other way round.
+    brick_cells: f32,
     // Of the volume, in finest cells.
     cells: vec3f,
-    units_per_cell: f32,
+    bricks_per_cell: f32,
     // Per axis: optical depth to the base 2 per finest cell of matter that has depth 1 per unit length.
     depth_per_cell: vec3f,
     // bin = (texel - texel_of_bin_zero) * bins_per_texel
@@ -39,24 +36,19 @@ struct Frame {
     // One over the atlas's size in texels.
     atlas_scale: vec2f,
     num_bins: f32,
-    // Of a brick in the atlas: slices side by side, and rows of texels.
+    // Of a brick in the atlas: slices side by side, the same the other way round, and rows of texels.
     slices_per_row: f32,
-    slot_height: f32,
     rows_per_slice: f32,
-    bricks_per_cell: f32,
+    slot_height: f32,
 }
 
 // Whether texels may be blank; then no value is carried from one cell to the next.
 override HAS_BLANKS: bool = false;
-// Whether texels are in `packed_atlas`.
-override IS_PACKED: bool = false;
 
 // Texels from here on are blank.
 const BLANK: f32 = 1e38;
 // Optical depth to the base 2 at which a ray stops: it lets 1/4096 of the light through.
 const OPAQUE_DEPTH: f32 = 12.0;
-// Cells along z whose corners a word of packed texels holds.
-const CELLS_PER_WORD: u32 = 3;
 // Pixels per edge of a workgroup's tile.
 const TILE: u32 = 8;
 // In a unit's first word: set where it holds matter; then come the level, and the layer and row of the brick's
@@ -78,12 +70,9 @@ const CELLS_MASK: u32 = 1023;
 // A brick's slices of equal z lie side by side, in rows of `slices_per_row`; bricks one below the other, then
 // in layers. So a brick is compact in memory, and a gather reads four corners of a cell at once.
 @group(0) @binding(2) var atlas: texture_2d_array<f32>;
-// The same for texels of 8 bits: a word holds four of successive z, the last of them again the first of the next
-// word, so that one gather reads a whole cell.
-@group(0) @binding(3) var packed_atlas: texture_2d_array<u32>;
-@group(0) @binding(4) var atlas_sampler: sampler;
-@group(0) @binding(5) var transfer: texture_2d<f32>;
-@group(0) @binding(6) var<storage, read_write> picture: array<f32>;
+@group(0) @binding(3) var atlas_sampler: sampler;
+@group(0) @binding(4) var transfer: texture_2d<f32>;
+@group(0) @binding(5) var<storage, read_write> picture: array<f32>;
 
 struct Ray {
     start: vec3f,
@@ -135,19 +124,11 @@ fn ray_of_pixel(pixel: vec2u) -> Ray {
 // Where a gather reads the corners of a cell in the slice z of a brick.
 fn slice_place(corner: vec2f, z: f32) -> vec2f {
     let row = floor((z + 0.5) * frame.rows_per_slice);
-    let edge = f32(frame.brick_cells + 1u);
-    return (corner + edge * vec2f(z - row * frame.slices_per_row, row)) * frame.atlas_scale;
+    return (corner + (frame.brick_cells + 1.0) * vec2f(z - row * frame.slices_per_row, row)) * frame.atlas_scale;
 }
 
 fn corners_of_cell(slot: vec2u, cell: vec3f) -> Corners {
     let corner = vec2f(0.0, f32(slot.y) * frame.slot_height) + cell.xy + 1.0;
-    if IS_PACKED {
-        let word = floor((cell.z + 0.5) * (1.0 / f32(CELLS_PER_WORD)));
-        let words = textureGather(0, packed_atlas, atlas_sampler, slice_place(corner, word), slot.x);
-        let shift = vec4u(8u * u32(cell.z - f32(CELLS_PER_WORD) * word));
-        let low = vec4f((words >> shift) & vec4u(255u));
-        return Corners(low, vec4f((words >> (shift + 8u)) & vec4u(255u)) - low);
-    }
     let low = textureGather(0, atlas, atlas_sampler, slice_place(corner, cell.z), slot.x);
     let high = textureGather(0, atlas, atlas_sampler, slice_place(corner, cell.z + 1.0), slot.x);
     return Corners(low, high - low);
@@ -201,7 +182,7 @@ fn light_along(ray: Ray) -> vec3f {
     // The value at t, where the cell before was of the same level; its level, or none.
     var end = End(0, vec4f(0.0));
     var end_level = NO_LEVEL;
-    let unit_size = f32(frame.unit_cells);
+    let unit_size = frame.unit_cells;
     while t < t_end && light.depth < OPAQUE_DEPTH && all(place >= vec3f(0.0)) && all(place < frame.cells) {
         let unit = floor((place + 0.5) * frame.units_per_cell);
         let words = textureLoad(units, vec3i(unit), 0).xy;
@@ -211,7 +192,7 @@ fn light_along(ray: Ray) -> vec3f {
         let scale = bitcast<f32>((127u + level) << 23u);
         let inverse_scale = bitcast<f32>((127u - level) << 23u);
         // Of the brick and its cell: lower corner.
-        let brick_size = scale * f32(frame.brick_cells);
+        let brick_size = scale * frame.brick_cells;
         let brick_low = floor((place + 0.5) * (frame.bricks_per_cell * inverse_scale)) * brick_size;
         let cell = floor((place + 0.5 - brick_low) * inverse_scale);
         let cells = vec3f((vec3u(words.y) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));

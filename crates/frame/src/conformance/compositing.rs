@@ -13,7 +13,8 @@ use super::world::{BACKGROUND_F64, Storage, Volume, draw, transfer};
 /// 32 bits accumulate to about 1e-5 of the f64 sum.
 pub fn thousands_of_thin_layers(backend: &mut dyn Backend) {
     let storage = Storage { brick_cells: 32, ..Storage::plain(TexelType::U8) };
-    let volume = Volume::new([5, 5, 4097], DVec3::ONE, storage, |p| if p.z % 4.0 < 2.0 { 40.0 } else { 200.0 });
+    let volume =
+        Volume::new([5, 5, 4097], DVec3::ONE, storage, |p| if p.z % 4.0 < 2.0 { 40.0 } else { 200.0 });
     let tf = transfer(&[[40.0, 1.0, 0.9, 0.1, 1e-4], [200.0, 0.1, 0.6, 1.0, 1e-4]], 1.0);
     let target = DVec3::new(2.0, 2.0, 2048.0);
     let (up, projection) = (DVec3::Y, Projection::Orthographic { height: 6.0 });
@@ -31,7 +32,8 @@ pub fn thousands_of_thin_layers(backend: &mut dyn Backend) {
 pub fn dense_matter_stops_rays_unseen(backend: &mut dyn Backend) {
     let volume = Volume::new([25, 25, 65], DVec3::ONE, Storage::F32, |p| p.z / 64.0);
     // Dark in front, bright behind: what is left out would brighten.
-    let tf = transfer(&[[0.0, 0.0, 0.0, 0.0, 0.2], [0.5, 0.0, 0.0, 0.0, 0.2], [1.0, 1.0, 1.0, 1.0, 0.9]], 1.0);
+    let tf =
+        transfer(&[[0.0, 0.0, 0.0, 0.0, 0.2], [0.5, 0.0, 0.0, 0.0, 0.2], [1.0, 1.0, 1.0, 1.0, 0.9]], 1.0);
     for elevation in [-80.0, 80.0] {
         let camera = Camera::fitted(volume.extent(), 20.0, elevation, 1.5, false);
         let expected = march_volume(&volume, &tf, 64.0, &camera, [24, 24], BACKGROUND_F64);

@@ -31,13 +31,7 @@ fn uniform_cube(backend: &mut dyn Backend, orthographic: bool) {
         });
         assert_shows_something("uniform cube", &expected, BACKGROUND_F64);
         let image = draw(backend, &volume, &tf, &camera, SIZE);
-        assert_close(
-            &format!("uniform cube from {azimuth}, {elevation}"),
-            &image,
-            &expected,
-            2e-5,
-            1e-5,
-        );
+        assert_close(&format!("uniform cube from {azimuth}, {elevation}"), &image, &expected, 2e-5, 1e-5);
     }
 }
 
@@ -75,24 +69,15 @@ pub fn linear_ramp_is_the_closed_form(backend: &mut dyn Backend) {
         });
         assert_shows_something("linear ramp", &expected, BACKGROUND_F64);
         let image = draw(backend, &volume, &tf, &camera, SIZE);
-        assert_close(
-            &format!("linear ramp, orthographic {orthographic}"),
-            &image,
-            &expected,
-            2e-4,
-            5e-5,
-        );
+        assert_close(&format!("linear ramp, orthographic {orthographic}"), &image, &expected, 2e-4, 5e-5);
     }
 }
 
 /// A ramp whose colour changes along the ray: front colours hide those behind.
 pub fn color_ramp_matches_the_march(backend: &mut dyn Backend) {
-    let volume =
-        Volume::new([12, 14, 33], DVec3::ONE, Storage::F32, |p| (p.z / 32.0 + p.x * 0.01).min(1.1));
-    let tf = transfer(
-        &[[0.0, 1.0, 0.0, 0.0, 0.05], [0.4, 0.0, 1.0, 0.0, 0.15], [1.0, 0.0, 0.0, 1.0, 0.3]],
-        1.0,
-    );
+    let volume = Volume::new([12, 14, 33], DVec3::ONE, Storage::F32, |p| (p.z / 32.0 + p.x * 0.01).min(1.1));
+    let tf =
+        transfer(&[[0.0, 1.0, 0.0, 0.0, 0.05], [0.4, 0.0, 1.0, 0.0, 0.15], [1.0, 0.0, 0.0, 1.0, 0.3]], 1.0);
     for (azimuth, elevation) in [(20.0, 70.0), (20.0, -70.0), (0.0, 0.0)] {
         let camera = Camera::fitted(volume.extent(), azimuth, elevation, 1.0, false);
         let expected = march_volume(&volume, &tf, 64.0, &camera, SIZE, BACKGROUND_F64);
@@ -177,7 +162,8 @@ pub fn opaque_step_stands_at_its_value(backend: &mut dyn Backend) {
     // The distance to the centre of a ball; trilinear between samples.
     let centre = DVec3::new(9.3, 8.8, 10.1);
     let volume = Volume::new([20, 19, 22], DVec3::ONE, Storage::F32, move |p| p.distance(centre));
-    let tf = transfer(&[[0.0, 1.0, 0.7, 0.2, 1.0], [6.5, 1.0, 0.7, 0.2, 1.0], [6.5, 0.0, 0.0, 0.0, 0.0]], 1.0);
+    let tf =
+        transfer(&[[0.0, 1.0, 0.7, 0.2, 1.0], [6.5, 1.0, 0.7, 0.2, 1.0], [6.5, 0.0, 0.0, 0.0, 0.0]], 1.0);
     let camera = Camera::fitted(volume.extent(), 25.0, 40.0, 1.0, false);
     let expected = march_volume(&volume, &tf, 400.0, &camera, SIZE, BACKGROUND_F64);
     assert_shows_something("opaque step", &expected, BACKGROUND_F64);

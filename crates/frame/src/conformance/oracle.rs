@@ -119,7 +119,9 @@ pub(super) fn difference(found: &Image, expected: &Pixels) -> [f64; 2] {
 /// Panics unless the picture is within both thresholds; prints them with what was measured.
 pub(super) fn assert_close(what: &str, found: &Image, expected: &Pixels, max: f64, rmse: f64) {
     let [found_max, found_rmse] = difference(found, expected);
-    println!("{what}: max {found_max:.2e} (threshold {max:.1e}), rmse {found_rmse:.2e} (threshold {rmse:.1e})");
+    println!(
+        "{what}: max {found_max:.2e} (threshold {max:.1e}), rmse {found_rmse:.2e} (threshold {rmse:.1e})"
+    );
     assert!(
         found_max <= max && found_rmse <= rmse,
         "{what}: max {found_max:e}, expected at most {max:e}; rmse {found_rmse:e}, expected at most {rmse:e}"

@@ -24,7 +24,8 @@ pub fn error_falls_with_the_square_of_the_cell(backend: &mut dyn Backend) {
     let cells = [4_u32, 8, 16, 32];
     let errors = cells.map(|n| {
         let spacing = 1.0 / f64::from(n);
-        let volume = Volume::new([n + 1; 3], DVec3::splat(spacing), Storage::F32, move |p| field(p * spacing));
+        let volume =
+            Volume::new([n + 1; 3], DVec3::splat(spacing), Storage::F32, move |p| field(p * spacing));
         let [max, rmse] = difference(&draw(backend, &volume, &tf, &camera, size), &expected);
         println!("{n} cells: rmse {rmse:.3e}, max {max:.3e}");
         rmse

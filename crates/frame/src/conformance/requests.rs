@@ -3,9 +3,7 @@
 use glam::DVec3;
 use volery_scene::Camera;
 
-use crate::{
-    Backend, Brick, BrickId, DrawError, Frame, Image, PlacedBrick, TexelType, Texels, UploadError,
-};
+use crate::{Backend, Brick, BrickId, DrawError, Frame, Image, PlacedBrick, TexelType, Texels, UploadError};
 
 use super::oracle::{assert_background, assert_close, assert_same_bits, march_volume};
 use super::world::{
@@ -187,7 +185,11 @@ pub fn bricks_that_do_not_fit_are_refused_and_change_nothing(backend: &mut dyn B
                 println!("refused: {found}, expected {expected}");
                 assert_eq!(*named, id, "the brick that does not fit");
             }
-            _ => panic!("{:?} texels of {:?} samples: {found:?}, expected a mismatch", bad.texels.len(), bad.samples),
+            _ => panic!(
+                "{:?} texels of {:?} samples: {found:?}, expected a mismatch",
+                bad.texels.len(),
+                bad.samples
+            ),
         }
         assert!(!backend.is_resident(BrickId(901)), "a brick of a refused upload is resident");
         assert!(!backend.is_resident(id), "a refused brick is resident");
@@ -232,7 +234,8 @@ pub fn a_new_volume_forgets_bricks(backend: &mut dyn Backend) {
 pub fn resident_bytes_count_the_texels(backend: &mut dyn Backend) {
     let (volume, camera) = scene();
     let bricks = volume.bricks(&camera);
-    let texels: u64 = bricks.iter().map(|brick| brick.samples.iter().map(|&n| u64::from(n)).product::<u64>()).sum();
+    let texels: u64 =
+        bricks.iter().map(|brick| brick.samples.iter().map(|&n| u64::from(n)).product::<u64>()).sum();
     hold(backend, &volume, &bricks);
     let bytes = backend.resident_bytes();
     println!("{bytes} bytes resident for {texels} bytes of texels (threshold: at least as many)");

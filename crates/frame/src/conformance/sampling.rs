@@ -127,7 +127,10 @@ pub fn constant_volume(backend: &mut dyn Backend) {
     for texel in [TexelType::U8, TexelType::U16, TexelType::F32] {
         for value in [0.0, 77.0] {
             let volume = Volume::new([11, 10, 12], DVec3::ONE, Storage::plain(texel), move |_| value);
-            let tf = transfer(&[[-1.0, 0.9, 0.4, 0.2, 0.0], [0.0, 0.9, 0.4, 0.2, 0.1], [200.0, 0.9, 0.4, 0.2, 0.1]], 1.0);
+            let tf = transfer(
+                &[[-1.0, 0.9, 0.4, 0.2, 0.0], [0.0, 0.9, 0.4, 0.2, 0.1], [200.0, 0.9, 0.4, 0.2, 0.1]],
+                1.0,
+            );
             let camera = Camera::fitted(volume.extent(), 35.0, 25.0, 1.2, false);
             let expected = march_volume(&volume, &tf, 24.0, &camera, SIZE, BACKGROUND_F64);
             assert_shows_something("constant volume", &expected, BACKGROUND_F64);

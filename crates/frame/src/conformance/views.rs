@@ -44,7 +44,11 @@ pub fn eye_inside(backend: &mut dyn Backend) {
 pub fn eye_on_the_corner_of_bricks(backend: &mut dyn Backend) {
     let eye = DVec3::new(16.0, 8.0, 16.0);
     for target in [DVec3::new(0.0, 24.0, 28.0), DVec3::new(32.0, 0.5, 3.0), DVec3::new(32.0, 8.0, 16.0)] {
-        assert_like_the_march(backend, &format!("eye on a corner, to {target}"), &perspective(eye, target, 90.0));
+        assert_like_the_march(
+            backend,
+            &format!("eye on a corner, to {target}"),
+            &perspective(eye, target, 90.0),
+        );
     }
 }
 
@@ -52,7 +56,11 @@ pub fn eye_on_the_corner_of_bricks(backend: &mut dyn Backend) {
 pub fn eye_on_the_face_of_a_brick(backend: &mut dyn Backend) {
     let eye = DVec3::new(8.0, 11.3, 13.7);
     for target in [DVec3::new(32.0, 12.0, 14.0), DVec3::new(0.0, 12.0, 14.0), DVec3::new(8.0, 24.0, 27.0)] {
-        assert_like_the_march(backend, &format!("eye on a face, to {target}"), &perspective(eye, target, 90.0));
+        assert_like_the_march(
+            backend,
+            &format!("eye on a face, to {target}"),
+            &perspective(eye, target, 90.0),
+        );
     }
 }
 
@@ -96,7 +104,13 @@ pub fn axis_aligned_views_on_sample_planes(backend: &mut dyn Backend) {
                         image.pixels[index as usize] = BACKGROUND;
                     }
                 }
-                assert_close(&format!("along {axis}, side {side}, {projection:?}"), &image, &expected, 0.01, 0.002);
+                assert_close(
+                    &format!("along {axis}, side {side}, {projection:?}"),
+                    &image,
+                    &expected,
+                    0.01,
+                    0.002,
+                );
             }
         }
     }

@@ -161,11 +161,7 @@ impl Volume {
 
     /// The bricks of a cut, front to back: from the root on, nodes for which `refine` holds are replaced by
     /// their children.
-    pub(super) fn cut(
-        &self,
-        camera: &Camera,
-        refine: impl Fn(u32, [u32; 3]) -> bool,
-    ) -> Vec<OwnedBrick> {
+    pub(super) fn cut(&self, camera: &Camera, refine: impl Fn(u32, [u32; 3]) -> bool) -> Vec<OwnedBrick> {
         let largest = self.layout.cells.into_iter().max().unwrap_or(0);
         let root = (0..32).find(|&level| self.layout.brick_cells << level >= largest).unwrap_or(31);
         let mut bricks = Vec::new();
@@ -244,8 +240,7 @@ pub(super) fn draw_resident(
     assert!(camera.defects().is_empty(), "the suite's camera: {:?}", camera.defects());
     let placed: Vec<_> = bricks.iter().map(|brick| brick.placed).collect();
     let transfer = &volume.integrated(transfer);
-    let frame =
-        Frame { width, height, camera: *camera, transfer, background: BACKGROUND, bricks: &placed };
+    let frame = Frame { width, height, camera: *camera, transfer, background: BACKGROUND, bricks: &placed };
     let drawn = backend.draw(&frame).expect("every brick is resident and in its place");
     assert_eq!((drawn.image.width, drawn.image.height), (width, height), "size of the picture");
     assert!(drawn.device_seconds.is_none_or(|s| s >= 0.0 && s.is_finite()), "{:?}", drawn.device_seconds);
