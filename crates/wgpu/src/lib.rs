@@ -1,12 +1,16 @@
 //! Executes frames on a GPU, or on a CPU that pretends to be one, through wgpu.
 //!
 //! # Method
-//! Bricks lie side by side in one texture, the [pool](pool), z as its layers: `textureGather` then reads four
-//! corners of a cell at once, and two gathers make a cell whole in 32 bits, where a GPU's own trilinear
-//! filter rounds weights to 8. A compute shader casts one ray per pixel. Space is divided into [units](units);
-//! of each, one texel says which brick is there, or how far around space is empty, so that a ray leaps over
-//! emptiness in few steps. In occupied space the ray visits every cell between samples, cuts it in two pieces
-//! and integrates each through the frame's [`IntegratedTransfer`](volery_frame::IntegratedTransfer).
+//! Bricks lie in one texture, the pool, as 2D slices: `textureGather` reads four corners of a cell at once, so
+//! that two gathers make a cell whole in 32 bits, where a GPU's own trilinear filter rounds weights to 8. A
+//! compute shader casts one ray per pixel. Space is divided into units; of each, one texel says which brick is
+//! there, or how far around space is empty, so that a ray leaps over emptiness in few steps. In occupied space
+//! the ray visits every cell between samples, cuts it in two pieces and integrates each through the frame's
+//! [`IntegratedTransfer`](volery_frame::IntegratedTransfer).
+//!
+//! Leaps and cells are rounds of one loop. On llvmpipe, 512x512 pixels of a 256x256x128 volume took 170 ms so,
+//! and 250 ms with a loop over cells inside a loop over blocks, where the rays of a SIMD group wait for one
+//! another.
 //!
 //! Rays are rebased in f64 to a start near the volume before they become f32, so an eye a million cells away
 //! loses nothing. Light accumulates in 32 bits as differences of transmittance, which add up exactly. A ray
@@ -17,8 +21,8 @@
 //! device.
 //!
 //! # Limits
-//! Bricks of at most 1023 cells, and of one cell less than the device has texture layers (255 on any). The
-//! pool is one texture: about 2 GB of 8-bit texels where textures have 8192 texels per axis.
+//! Bricks of at most about 400 cells, and a pool of at most about 2 GB of 8-bit texels, where textures have 8192
+//! texels per axis and 256 layers. Positions are f32: to a thousandth of a cell in volumes of 10,000 cells.
 //!
 //! # Non-goals
 //! No window, no interaction, no choice of bricks.

@@ -334,3 +334,33 @@ fn check(brick: &Brick<'_>, layout: &VolumeLayout) -> Result<(), UploadError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Devices with small textures, and large bricks on any, need more than one row of slices.
+    #[test]
+    fn every_texel_has_a_place_of_its_own() {
+        for (edge, max_width, slices_per_row) in [(5, 100, 5), (5, 12, 2), (5, 5, 1), (4, 15, 3)] {
+            let slot = Slot::new(edge, max_width);
+            assert_eq!(slot.slices_per_row, slices_per_row);
+            assert!(slot.size[0] <= max_width);
+            for samples in [[edge; 3], [2, edge, 3], [1, 1, 1]] {
+                let num: u32 = samples.iter().product();
+                let texels: Vec<u16> = (1..=num as u16).collect();
+                let bytes = slot.fold(samples, &texels, |texel| texel);
+                let folded: &[u16] = bytemuck::cast_slice(&bytes);
+                assert_eq!(folded.len() as u32, slot.size[0] * slot.size[1]);
+                assert_eq!(folded.iter().filter(|&&texel| texel != 0).count() as u32, num);
+                for (index, &texel) in (0..).zip(&texels) {
+                    let [x, y] = [index % samples[0], index / samples[0] % samples[1]];
+                    let z = index / samples[0] / samples[1];
+                    let column = x + z % slices_per_row * edge;
+                    let row = y + z / slices_per_row * edge;
+                    assert_eq!(folded[(row * slot.size[0] + column) as usize], texel, "({x}, {y}, {z})");
+                }
+            }
+        }
+    }
+}

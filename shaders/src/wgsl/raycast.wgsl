@@ -42,13 +42,15 @@ struct Frame {
     slot_height: f32,
 }
 
-// Whether texels may be blank; then no value is carried from one cell to the next.
+// Whether texels may be blank.
 override HAS_BLANKS: bool = false;
 
 // Texels from here on are blank.
 const BLANK: f32 = 1e38;
 // Optical depth to the base 2 at which a ray stops: it lets 1/4096 of the light through.
 const OPAQUE_DEPTH: f32 = 12.0;
+// Changes of the transfer function's antiderivative below this are none: their inverse might not be finite.
+const INVISIBLE: f32 = 1e-30;
 // Pixels per edge of a workgroup's tile.
 const TILE: u32 = 8;
 // In a unit's first word: set where it holds matter; then come the level, and the layer and row of the brick's
@@ -156,7 +158,7 @@ fn integrate(light: ptr<function, Light>, from_end: End, bin: i32, depth_scale: 
     let change = sums - from_end.sums;
     // One division for two: by the bins passed and by the change of depth.
     let num_bins = f32(to_bin - from_end.bin);
-    let inverse = 1.0 / (num_bins * select(change.w, 1.0, change.w == 0.0));
+    let inverse = 1.0 / (num_bins * select(change.w, 1.0, abs(change.w) < INVISIBLE));
     let depth = (*light).depth + depth_scale * change.w * (change.w * inverse);
     let transmittance = exp2(-depth);
     // The differences of transmittance add up to exactly what is missing behind.

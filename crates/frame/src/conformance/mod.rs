@@ -96,7 +96,8 @@ properties! { $
         constant_volume
         blank_samples_clear_the_cells_that_touch_them
         volume_of_blanks_shows_the_background
-        small_bricks_and_large_ones_agree;
+        small_bricks_and_large_ones_agree
+        bricks_of_many_cells;
     levels:
         ramp_is_the_same_in_mixed_levels
         coarse_bricks_end_with_the_domain

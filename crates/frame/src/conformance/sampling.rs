@@ -179,3 +179,10 @@ pub fn small_bricks_and_large_ones_agree(backend: &mut dyn Backend) {
         assert_close("other bricks", image, &expected, 1e-3, 2e-4);
     }
 }
+
+/// Bricks so large that a texture may not hold their slices side by side.
+pub fn bricks_of_many_cells(backend: &mut dyn Backend) {
+    let storage = Storage { brick_cells: 160, ..Storage::unit(TexelType::U8) };
+    let volume = rings([30, 12, 170], DVec3::ONE, storage);
+    assert_like_the_march(backend, "bricks of 160 cells", &volume);
+}
