@@ -6,6 +6,7 @@ mod emit;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::{env, fs};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -18,10 +19,13 @@ struct Shader {
     module: naga::Module,
 }
 
-fn main() {
-    if let Err(report) = run() {
-        eprintln!("{report}");
-        std::process::exit(1);
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(report) => {
+            eprintln!("{report}");
+            ExitCode::FAILURE
+        }
     }
 }
 

@@ -43,7 +43,7 @@ impl Tally {
 fn ignored_by_attribute(line: &str) -> Option<(&str, &str)> {
     let (name, outcome) = line.strip_prefix("test ")?.split_once(" ... ")?;
     let reason = outcome.strip_prefix("ignored")?;
-    Some((name, reason.strip_prefix(", ").unwrap_or("marked as ignored")))
+    Some((name.trim_end(), reason.strip_prefix(", ").unwrap_or("marked as ignored")))
 }
 
 /// The number that stands before `word`.
@@ -78,7 +78,7 @@ mod tests {
     fn sums_all_programs_and_takes_what_was_not_run_from_the_passed() {
         let found = tally_of(
             "running 3 tests\n\
-             test trees::a ... ok\ntest trees::b ... ok\ntest trees::c ... ignored, takes an hour\n\
+             test trees::a ... ok\ntest trees::b ... ok\ntest trees::c    ... ignored, takes an hour\n\
              \nsuccesses:\n\n---- trees::b stdout ----\nignored: trees::b (no GPU)\nignored: trees::b (no data)\n\
              \nsuccesses:\n    trees::b\n\
              test result: ok. 2 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.10s\n\

@@ -76,86 +76,64 @@ fn nrrd_skips_bytes_from_either_end() {
     }
 }
 
+/// Fields of a header, and how its refusal begins.
+const NRRD_LIES: &[(&str, &str)] = &[
+    ("", "dimension is missing, expected it in the header"),
+    ("dimension: 3", "sizes is missing"),
+    ("dimension: 2\nsizes: 3 2 2", "sizes is '[3, 2, 2]', expected 2 of 1 to 16"),
+    ("dimension: 99999999999999999999\nsizes: 3", "dimension is '99999999999999999999', expected 1 to 16"),
+    ("dimension: 3\nsizes: 3 -2 2", "sizes is '3 -2 2', expected whole numbers"),
+    ("dimension: 3\nsizes: 0 2 2\ntype: uint8\nencoding: raw", "sizes is [0, 2, 2], expected at least 1"),
+    ("dimension: 3\nsizes: 3 2 2", "type is missing"),
+    ("dimension: 3\nsizes: 3 2 2\ntype: block", "type is 'block', expected an integer"),
+    ("dimension: 3\nsizes: 3 2 2\ntype: int64", "type is 'int64', expected an integer of at most 32 bits"),
+    ("dimension: 3\nsizes: 3 2 2\ntype: short\nencoding: raw", "endian is missing, expected the byte order"),
+    ("dimension: 3\nsizes: 3 2 2\ntype: short\nendian: middle", "endian is 'middle', expected little or big"),
+    ("dimension: 3\nsizes: 3 2 2\ntype: uint8", "encoding is missing"),
+    ("dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: bzip2", "encoding is 'bzip2', expected raw or gzip"),
+    (
+        "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspacings: 1 nan 1",
+        "spacings of axis 1 is NaN",
+    ),
+    (
+        "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspacings: 1 1",
+        "spacings is 2 entries, expected 3",
+    ),
+    (
+        "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspace directions: (1,0 (0,1)",
+        "space directions is",
+    ),
+    (
+        "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspace directions: (0,0,0) (0,1,0) (0,0,1)",
+        "spacings of axis 0 is 0",
+    ),
+    ("dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nline skip: 3", "line skip is '3', expected 0"),
+    (
+        "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: gzip\nbyte skip: -1",
+        "byte skip is -1, expected 0 or more",
+    ),
+    (
+        "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nbyte skip: 9223372036854775807",
+        "the data part holds 0 bytes",
+    ),
+    (
+        "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\ndata file: LIST",
+        "data file is 'LIST', expected the name",
+    ),
+    ("dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\ndata file: i%03d.raw 1 9 1", "data file is"),
+    ("dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw", "the data part holds 0 bytes, expected 12"),
+    (
+        "dimension: 3\nsizes: 4294967296 4294967296 4294967296\ntype: double\nendian: big\nencoding: raw",
+        "the volume needs 633825300114114700748351602688 bytes",
+    ),
+    ("no colon here", "header line is 'no colon here', expected 'field: value'"),
+    ("dimension: \u{e9}", "dimension is '\u{e9}', expected 1 to 16"),
+];
+
 #[test]
 fn nrrd_lying_headers() {
     let folder = Folder::new();
-    let cases = [
-        ("", "dimension is missing, expected it in the header"),
-        ("dimension: 3", "sizes is missing"),
-        ("dimension: 2\nsizes: 3 2 2", "sizes is '[3, 2, 2]', expected 2 of 1 to 16"),
-        (
-            "dimension: 99999999999999999999\nsizes: 3",
-            "dimension is '99999999999999999999', expected 1 to 16",
-        ),
-        ("dimension: 3\nsizes: 3 -2 2", "sizes is '3 -2 2', expected whole numbers"),
-        ("dimension: 3\nsizes: 0 2 2\ntype: uint8\nencoding: raw", "sizes is [0, 2, 2], expected at least 1"),
-        ("dimension: 3\nsizes: 3 2 2", "type is missing"),
-        ("dimension: 3\nsizes: 3 2 2\ntype: block", "type is 'block', expected an integer"),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: int64",
-            "type is 'int64', expected an integer of at most 32 bits",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: short\nencoding: raw",
-            "endian is missing, expected the byte order",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: short\nendian: middle",
-            "endian is 'middle', expected little or big",
-        ),
-        ("dimension: 3\nsizes: 3 2 2\ntype: uint8", "encoding is missing"),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: bzip2",
-            "encoding is 'bzip2', expected raw or gzip",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspacings: 1 nan 1",
-            "spacings of axis 1 is NaN",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspacings: 1 1",
-            "spacings is 2 entries, expected 3",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspace directions: (1,0 (0,1)",
-            "space directions is",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nspace directions: (0,0,0) (0,1,0) (0,0,1)",
-            "spacings of axis 0 is 0",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nline skip: 3",
-            "line skip is '3', expected 0",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: gzip\nbyte skip: -1",
-            "byte skip is -1, expected 0 or more",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\nbyte skip: 9223372036854775807",
-            "the data part holds 0 bytes",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\ndata file: LIST",
-            "data file is 'LIST', expected the name",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw\ndata file: i%03d.raw 1 9 1",
-            "data file is",
-        ),
-        (
-            "dimension: 3\nsizes: 3 2 2\ntype: uint8\nencoding: raw",
-            "the data part holds 0 bytes, expected 12",
-        ),
-        (
-            "dimension: 3\nsizes: 4294967296 4294967296 4294967296\ntype: double\nendian: big\nencoding: raw",
-            "the volume needs 633825300114114700748351602688 bytes",
-        ),
-        ("no colon here", "header line is 'no colon here', expected 'field: value'"),
-        ("dimension: \u{e9}", "dimension is '\u{e9}', expected 1 to 16"),
-    ];
-    for (fields, expected) in cases {
+    for (fields, expected) in NRRD_LIES {
         let line = folder.refuse("a.nrrd", nrrd_text(fields, b""));
         assert!(line.starts_with(expected), "{line}, expected {expected}");
     }

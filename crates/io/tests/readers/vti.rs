@@ -85,78 +85,76 @@ fn the_array_is_the_one_asked_for_else_active_else_first_that_can_be_read() {
     assert_eq!(line, "NumberOfComponents is 3 of Float32, expected 1, or 3 or 4 of UInt8");
 }
 
+/// What to replace by what in [`SEVERAL`], and how the refusal begins.
+const LIES: &[(&str, &str, &str)] = &[
+    ("type=\"ImageData\"", "type=\"PolyData\"", "type is 'PolyData', expected ImageData"),
+    ("LittleEndian", "MiddleEndian", "byte_order is 'MiddleEndian', expected LittleEndian or BigEndian"),
+    (
+        "byte_order",
+        "compressor=\"vtkLZ4DataCompressor\" byte_order",
+        "compressor is 'vtkLZ4DataCompressor', expected",
+    ),
+    ("byte_order", "header_type=\"UInt8\" byte_order", "header_type is 'UInt8', expected UInt32 or UInt64"),
+    ("<VTKFile", "<svg/><VTKFile", "root element is 'svg', expected VTKFile"),
+    (
+        "Piece Extent=\"0 1 0 0 0 0\"",
+        "Piece Extent=\"0 1 0 0 0\"",
+        "Extent is '0 1 0 0 0', expected 6 numbers",
+    ),
+    (
+        "Piece Extent=\"0 1 0 0 0 0\"",
+        "Piece Extent=\"1 0 0 0 0 0\"",
+        "Extent is '[1, 0, 0, 0, 0, 0]', expected rising",
+    ),
+    (
+        "Piece Extent=\"0 1 0 0 0 0\"",
+        "Piece Extent=\"-9223372036854775808 9223372036854775807 0 0 0 0\"",
+        "Extent is",
+    ),
+    (
+        "Piece Extent=\"0 1 0 0 0 0\"",
+        "Piece Extent=\"0 9223372036854775806 0 9 0 9\"",
+        "the volume needs 922337203685477580700 bytes",
+    ),
+    (
+        "Piece Extent=\"0 1 0 0 0 0\"",
+        "Piece Extent=\"0 2 0 0 0 0\"",
+        "count of numbers in the array is 2, expected 3",
+    ),
+    (
+        "Piece Extent=\"0 1 0 0 0 0\"",
+        "Piece Extent=\"0 0 0 0 0 0\"",
+        "count of numbers in the array is more, expected 1",
+    ),
+    (
+        "Piece Extent=\"0 1 0 0 0 0\"",
+        "Piece Extent=\"0 60000000000 0 0 0 0\"",
+        "count of numbers in the array is 2, expected 60000000001",
+    ),
+    ("</Piece>", "</Piece><Piece Extent=\"1 2 0 0 0 0\"></Piece>", "number of pieces is 2, expected 1"),
+    ("Spacing=\"1 1 1\"", "Spacing=\"nan 1 1\"", "Spacing of axis 0 is NaN"),
+    ("Spacing=\"1 1 1\"", "Spacing=\"1 1\"", "Spacing is '1 1', expected 3 numbers"),
+    ("Spacing=\"1 1 1\"", "Spacing=\"0 1 1\"", "Spacing of axis 0 is 0"),
+    ("> 3", "> 333", "the data of the array is '333', expected a number of its type"),
+    (
+        "\"b&amp;c\" format=\"ascii\"",
+        "\"b&amp;c\" format=\"hex\"",
+        "format is 'hex', expected ascii, binary or appended",
+    ),
+    (
+        "\"b&amp;c\" format=\"ascii\"",
+        "\"b&amp;c\" format=\"appended\" offset=\"0\"",
+        "AppendedData is missing",
+    ),
+    ("\"b&amp;c\" format=\"ascii\"", "\"b&amp;c\" format=\"binary\"", "the data of the array is damaged"),
+    ("</ImageData></VTKFile>", "</VTKFile>", "the XML is damaged: "),
+    ("</PointData>", "<DataArray></PointData>", "the XML is damaged: "),
+];
+
 #[test]
 fn lying_attributes() {
     let folder = Folder::new();
-    let cases = [
-        ("type=\"ImageData\"", "type=\"PolyData\"", "type is 'PolyData', expected ImageData"),
-        ("LittleEndian", "MiddleEndian", "byte_order is 'MiddleEndian', expected LittleEndian or BigEndian"),
-        (
-            "byte_order",
-            "compressor=\"vtkLZ4DataCompressor\" byte_order",
-            "compressor is 'vtkLZ4DataCompressor', expected",
-        ),
-        (
-            "byte_order",
-            "header_type=\"UInt8\" byte_order",
-            "header_type is 'UInt8', expected UInt32 or UInt64",
-        ),
-        ("<VTKFile", "<svg/><VTKFile", "root element is 'svg', expected VTKFile"),
-        (
-            "Piece Extent=\"0 1 0 0 0 0\"",
-            "Piece Extent=\"0 1 0 0 0\"",
-            "Extent is '0 1 0 0 0', expected 6 numbers",
-        ),
-        (
-            "Piece Extent=\"0 1 0 0 0 0\"",
-            "Piece Extent=\"1 0 0 0 0 0\"",
-            "Extent is '[1, 0, 0, 0, 0, 0]', expected rising",
-        ),
-        (
-            "Piece Extent=\"0 1 0 0 0 0\"",
-            "Piece Extent=\"-9223372036854775808 9223372036854775807 0 0 0 0\"",
-            "Extent is",
-        ),
-        (
-            "Piece Extent=\"0 1 0 0 0 0\"",
-            "Piece Extent=\"0 9223372036854775806 0 9 0 9\"",
-            "the volume needs 922337203685477580700 bytes",
-        ),
-        (
-            "Piece Extent=\"0 1 0 0 0 0\"",
-            "Piece Extent=\"0 2 0 0 0 0\"",
-            "count of numbers in the array is 2, expected 3",
-        ),
-        (
-            "Piece Extent=\"0 1 0 0 0 0\"",
-            "Piece Extent=\"0 0 0 0 0 0\"",
-            "count of numbers in the array is more, expected 1",
-        ),
-        (
-            "Piece Extent=\"0 1 0 0 0 0\"",
-            "Piece Extent=\"0 60000000000 0 0 0 0\"",
-            "count of numbers in the array is 2, expected 60000000001",
-        ),
-        ("</Piece>", "</Piece><Piece Extent=\"1 2 0 0 0 0\"></Piece>", "number of pieces is 2, expected 1"),
-        ("Spacing=\"1 1 1\"", "Spacing=\"nan 1 1\"", "Spacing of axis 0 is NaN"),
-        ("Spacing=\"1 1 1\"", "Spacing=\"1 1\"", "Spacing is '1 1', expected 3 numbers"),
-        ("Spacing=\"1 1 1\"", "Spacing=\"0 1 1\"", "Spacing of axis 0 is 0"),
-        ("> 3", "> 333", "the data of the array is '333', expected a number of its type"),
-        (
-            "\"b&amp;c\" format=\"ascii\"",
-            "\"b&amp;c\" format=\"hex\"",
-            "format is 'hex', expected ascii, binary or appended",
-        ),
-        (
-            "\"b&amp;c\" format=\"ascii\"",
-            "\"b&amp;c\" format=\"appended\" offset=\"0\"",
-            "AppendedData is missing",
-        ),
-        ("\"b&amp;c\" format=\"ascii\"", "\"b&amp;c\" format=\"binary\"", "the data of the array is damaged"),
-        ("</ImageData></VTKFile>", "</VTKFile>", "the XML is damaged: "),
-        ("</PointData>", "<DataArray></PointData>", "the XML is damaged: "),
-    ];
-    for (from, to, expected) in cases {
+    for &(from, to, expected) in LIES {
         assert!(SEVERAL.contains(from), "{from}");
         let line = folder.refuse("a.vti", SEVERAL.replacen(from, to, 1));
         assert!(line.starts_with(expected), "{line}, expected {expected}");
