@@ -42,7 +42,8 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
     })?;
     stage("tidy", tidy::run)?;
     stage("documentation", || {
-        let mut doc = shell::cargo(&["doc", "--workspace", "--no-deps", "--lib", "--quiet"]);
+        let mut doc =
+            shell::cargo(&["doc", "--workspace", "--no-deps", "--lib", "--all-features", "--quiet"]);
         shell::run(doc.env("RUSTDOCFLAGS", "-D warnings"))
     })?;
 

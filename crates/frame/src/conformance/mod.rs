@@ -2,7 +2,7 @@
 //!
 //! # Method
 //! Pictures are compared with closed forms where there are any, else with a slow march in f64 through the
-//! field that the bricks were cut from ([`march`](oracle::march)), midpoint rule, many steps per cell. The
+//! field that the bricks were cut from (`oracle::march`), midpoint rule, many steps per cell. The
 //! marcher shares nothing with a backend but the camera's rays and the transfer function. Every check
 //! prints its threshold beside the value that it measured.
 //!
