@@ -12,7 +12,7 @@
 //! - Nothing else: no sampling distance, no guard distance at the faces of bricks or of the volume.
 //!
 //! # Use
-//! ```ignore
+//! ```text
 //! volery_frame::conformance_tests!(MyBackend::new());
 //! ```
 //! makes a `#[test]` of each property, each with a fresh backend; [`ALL`] lists them for other runners.
