@@ -110,7 +110,7 @@ fn machine_paths(file: &File) -> Vec<Finding> {
     let finds = roots.iter().flat_map(|root| {
         file.text.lines().enumerate().filter_map(move |(index, line)| {
             let at = line.find(root)?;
-            // `../shared/work/x` is relative, `https://host/home/` is no path of a machine.
+            // What follows a word, a dot or a slash is part of a relative path or of an address.
             let before = line[..at].chars().next_back();
             let is_absolute =
                 !before.is_some_and(|c| c.is_alphanumeric() || matches!(c, '.' | '_' | '-' | '/' | '}'));
