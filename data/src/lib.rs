@@ -3,7 +3,7 @@
 //! Every generator is a pure function of its arguments: the same bits on every machine with the same
 //! `f64` mathematics library, no file, no clock, no random state. Where a closed form of the picture is
 //! wanted ([`uniform`], [`ramp`], [`half_space`]) the samples are exact; where a picture shall look like
-//! something ([`head`], [`marschner_lobb`]) they are smooth enough for it; where an algorithm shall be
+//! something ([`head`], [`tissue`], [`zone_plate`], [`marschner_lobb`]) they are smooth enough for it; where an algorithm shall be
 //! broken ([`noise`], [`holes`]) they have no structure at all.
 //!
 //! # Non-goals
@@ -15,8 +15,12 @@ use glam::DVec3;
 use volery_scene::{Samples, VoxelGrid};
 
 mod head;
+mod tissue;
+mod zone_plate;
 
 pub use head::{head, head_u8};
+pub use tissue::tissue;
+pub use zone_plate::zone_plate;
 
 /// Frequency of the rings of [`marschner_lobb`], `f_M` in the paper.
 const RING_FREQUENCY: f64 = 6.0;

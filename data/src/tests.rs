@@ -83,3 +83,37 @@ fn holes_have_the_share_asked_for() {
     assert!((333..=487).contains(&blank), "{blank} blank");
     assert!(infinite > 0 && infinite < blank / 2, "{infinite} infinite");
 }
+
+#[test]
+fn tissue_is_smooth_and_of_its_formula() {
+    let dims = [41, 33, 21];
+    let tissue = tissue(dims);
+    assert_eq!(tissue.sample_type(), SampleType::Rgba8);
+    let channel = |index: [usize; 3], c: usize| tissue.samples().value(tissue.index(index), c);
+    // In the middle the coarse gyroid is 0, and the fine one that of its phases alone.
+    let fine = (1f64.sin() * 2f64.cos() + 2f64.sin() * 3f64.cos() + 3f64.sin() * 1f64.cos()) / 1.5;
+    let expected = [0.64 + 0.09 * fine, 0.42 - 0.06 * fine, 0.34 - 0.08 * fine, 0.5 + 0.15 * fine];
+    for (c, expected) in expected.into_iter().enumerate() {
+        let found = channel([20, 16, 10], c);
+        assert_eq!(found, (255.0 * expected).round(), "channel {c}");
+    }
+    for c in 0..4 {
+        let [low, high] = tissue.value_range(c).unwrap();
+        assert!(low > 0.0 && high < 255.0 && high - low > 30.0, "channel {c}: {low} to {high}");
+    }
+}
+
+#[test]
+fn a_zone_plate_is_an_image_of_rings_on_tiles() {
+    let plate = zone_plate([257, 201]);
+    assert_eq!((plate.dims(), plate.sample_type()), ([257, 201, 1], SampleType::Rgb8));
+    let color = |x: usize| [0, 1, 2].map(|c| plate.samples().value(plate.index([x, 100, 0]), c));
+    // The middle is a crest, in a tile of sand: (128 / 17 + 100 / 17) is even.
+    assert_eq!(color(128), [0.95, 0.85, 0.60].map(|c| (255.0f64 * c).round()));
+    // 39² is 6 n but for 1 %, a trough; the tile two further on is of sky: (167 / 17 + 5) is even again.
+    let (crest, trough) = (color(128), color(167));
+    for c in 0..3 {
+        let found = trough[c] / crest[c];
+        assert!((0.24..0.27).contains(&found), "channel {c}: {found}");
+    }
+}

@@ -3,14 +3,18 @@
 //! - a `#[repr(C)]` struct for each struct in a uniform or storage buffer, with the shader's field names,
 //!   whose size and offsets the compiler checks against naga's;
 //! - each constant of a numeric type, and `NAME` of each override;
-//! - `BINDINGS`, and for each entry point its name and workgroup size.
+//! - `BINDINGS`, with the stages that use them;
+//! - for each entry point its name, and of compute shaders the workgroup size.
+//!
+//! Vertices come out of buffers by their numbers: attributes of vertices are refused.
 
 use std::fmt::Write as _;
 
 use naga::proc::Layouter;
 use naga::{
-    AddressSpace, ArraySize, Expression, Handle, ImageClass, ImageDimension, Literal, Module, Scalar,
-    ScalarKind, StorageAccess, StructMember, Type, TypeInner, VectorSize,
+    AddressSpace, ArraySize, Binding, EntryPoint, Expression, GlobalVariable, Handle, ImageClass,
+    ImageDimension, Literal, Module, Scalar, ScalarKind, ShaderStage, StorageAccess, StructMember, Type,
+    TypeInner, VectorSize,
 };
 
 use crate::Shader;
@@ -36,14 +40,45 @@ pub(crate) fn module(shader: &Shader) -> Result<String, String> {
     }
     bindings(&mut text, shader, &layouter)?;
     for entry in &module.entry_points {
-        let (name, [x, y, z]) = (&entry.name, entry.workgroup_size);
-        let upper = name.to_uppercase();
-        text += &format!("/// Name of an entry point.\npub const {upper}: &str = {name:?};\n");
-        text += &format!("/// Invocations of a workgroup of [`{upper}`].\n");
-        text += &format!("pub const {upper}_WORKGROUP: [u32; 3] = [{x}, {y}, {z}];\n");
+        entry_point(&mut text, shader, entry)?;
     }
     text += "}\n";
     Ok(text)
+}
+
+fn entry_point(text: &mut String, shader: &Shader, entry: &EntryPoint) -> Result<(), String> {
+    let name = &entry.name;
+    let upper = name.to_uppercase();
+    *text += &format!("/// Name of an entry point.\npub const {upper}: &str = {name:?};\n");
+    let is_builtin = |binding: &Option<Binding>| matches!(binding, Some(Binding::BuiltIn(_)));
+    match entry.stage {
+        ShaderStage::Compute => {
+            let [x, y, z] = entry.workgroup_size;
+            *text += &format!("/// Invocations of a workgroup of [`{upper}`].\n");
+            *text += &format!("pub const {upper}_WORKGROUP: [u32; 3] = [{x}, {y}, {z}];\n");
+        }
+        ShaderStage::Vertex if !entry.function.arguments.iter().all(|a| is_builtin(&a.binding)) => {
+            let path = shader.path.display();
+            return Err(format!(
+                "{path}: {name}: an attribute of vertices, expected numbers of vertices only"
+            ));
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// The stages in which entry points use a resource.
+fn stages(shader: &Shader, variable: Handle<GlobalVariable>) -> String {
+    let is_used_in = |stage: ShaderStage| {
+        let entries = shader.module.entry_points.iter().enumerate();
+        entries.into_iter().any(|(place, entry)| {
+            entry.stage == stage && !shader.info.get_entry_point(place)[variable].is_empty()
+        })
+    };
+    let [vertex, fragment, compute] =
+        [ShaderStage::Vertex, ShaderStage::Fragment, ShaderStage::Compute].map(is_used_in);
+    format!("crate::Stages {{ vertex: {vertex}, fragment: {fragment}, compute: {compute} }}")
 }
 
 /// The table of all shaders.
@@ -147,7 +182,7 @@ fn bindings(text: &mut String, shader: &Shader, layouter: &Layouter) -> Result<(
     let module = &shader.module;
     *text += "/// What the shader's resources are, in the order of the file.\n";
     *text += "pub const BINDINGS: &[crate::Binding] = &[\n";
-    for (_, variable) in module.global_variables.iter() {
+    for (handle, variable) in module.global_variables.iter() {
         let Some(binding) = &variable.binding else { continue };
         let name = variable.name.as_deref().unwrap_or_default();
         let size = layouter[variable.ty].size;
@@ -176,9 +211,11 @@ fn bindings(text: &mut String, shader: &Shader, layouter: &Layouter) -> Result<(
             _ => return Err(unknown(shader, name)),
         };
         let (group, index) = (binding.group, binding.binding);
+        let stages = stages(shader, handle);
         let _ = writeln!(
             text,
-            "crate::Binding {{ name: {name:?}, group: {group}, binding: {index}, kind: crate::BindingKind::{kind} }},"
+            "crate::Binding {{ name: {name:?}, group: {group}, binding: {index}, stages: {stages}, \
+             kind: crate::BindingKind::{kind} }},"
         );
     }
     *text += "];\n";

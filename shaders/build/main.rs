@@ -17,6 +17,7 @@ struct Shader {
     name: String,
     path: PathBuf,
     module: naga::Module,
+    info: naga::valid::ModuleInfo,
 }
 
 fn main() -> ExitCode {
@@ -80,8 +81,8 @@ fn load(path: &Path) -> Result<Shader, String> {
     let module =
         naga::front::wgsl::parse_str(&source).map_err(|e| e.emit_to_string_with_path(&source, &shown))?;
     // Without capabilities: what every device has.
-    Validator::new(ValidationFlags::all(), Capabilities::empty())
+    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
         .validate(&module)
         .map_err(|e| e.emit_to_string_with_path(&source, &shown))?;
-    Ok(Shader { name: name_of(path)?, path: path.to_owned(), module })
+    Ok(Shader { name: name_of(path)?, path: path.to_owned(), module, info })
 }

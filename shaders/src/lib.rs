@@ -3,7 +3,7 @@
 //! # Method
 //! The build script runs every file under `src/wgsl` through naga. An error fails the build. From what naga
 //! found it writes a Rust module per shader: the text, `#[repr(C)]` structs of the buffers with the shader's
-//! own field names, constants, workgroup sizes and bindings. The compiler checks the structs' sizes and
+//! own field names, constants, entry points, workgroup sizes and bindings with the stages that use them. The compiler checks the structs' sizes and
 //! offsets against naga's, so the two sides cannot drift.
 //!
 //! # Non-goals
@@ -19,8 +19,21 @@ pub struct Binding {
     pub group: u32,
     /// Index in the group.
     pub binding: u32,
+    /// Where it is used.
+    pub stages: Stages,
     /// What it is.
     pub kind: BindingKind,
+}
+
+/// Stages of pipelines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stages {
+    /// The vertex stage of a render pipeline.
+    pub vertex: bool,
+    /// The fragment stage of a render pipeline.
+    pub fragment: bool,
+    /// A compute pipeline.
+    pub compute: bool,
 }
 
 /// What a resource is.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use volery_shaders::{ALL, BindingKind, raycast};
+use volery_shaders::{ALL, BindingKind, Stages, cubes, raycast};
 
 /// The build validates what it finds; this finds out that it looked at everything.
 #[test]
@@ -38,4 +38,14 @@ fn reflection_says_what_the_file_says() {
     assert_eq!(numbers, (0..numbers.len() as u32).map(|i| (0, i)).collect::<Vec<_>>());
     let picture = raycast::BINDINGS.iter().find(|b| b.name == "picture").unwrap();
     assert_eq!(picture.kind, BindingKind::Storage { read_only: false });
+}
+
+#[test]
+fn stages_are_those_that_use_a_resource() {
+    let stages_of = |name: &str| cubes::BINDINGS.iter().find(|b| b.name == name).unwrap().stages;
+    assert_eq!(stages_of("frame"), Stages { vertex: true, fragment: true, compute: false });
+    assert_eq!(stages_of("cubes"), Stages { vertex: true, fragment: false, compute: false });
+    assert_eq!([cubes::FAN, cubes::MATTER], ["fan", "matter"]);
+    let compute = Stages { vertex: false, fragment: false, compute: true };
+    assert!(raycast::BINDINGS.iter().all(|binding| binding.stages == compute));
 }

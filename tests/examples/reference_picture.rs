@@ -1,4 +1,5 @@
-//! Writes the reference picture of a scene as NumPy's `.npy`: `reference_picture SCENE.json DATA OUT.npy`.
+//! Writes the reference picture of a scene as NumPy's `.npy`: `reference_picture SCENE.json DATA OUT.npy`,
+//! or of a plane through its volume: `reference_picture SCENE.json DATA OUT.npy NX,NY,NZ,D`.
 //!
 //! `cargo xtask bench peers` compares VTK's pictures with it: rows from the top, f32, RGB.
 
@@ -6,18 +7,31 @@ use std::error::Error;
 use std::fs;
 use std::path::Path;
 
+use volery::glam::DVec3;
+use volery::{Plane, View};
+use volery_reference::PlaneScene;
 use volery_tests::view_of;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
-    let [scene, data, output] = arguments.as_slice() else {
-        return Err("usage: reference_picture SCENE.json DATA OUT.npy".into());
+    let (scene, data, output, plane) = match arguments.as_slice() {
+        [scene, data, output] => (scene, data, output, None),
+        [scene, data, output, plane] => (scene, data, output, Some(parse_plane(&plane.to_string_lossy())?)),
+        _ => return Err("usage: reference_picture SCENE.json DATA OUT.npy [NX,NY,NZ,D]".into()),
     };
     let input = volery::read_input(Path::new(scene), Some(Path::new(data)))?;
     let view = view_of(&input);
     let grid = &input.volume.grid;
     let (width, height) = (view.width, view.height);
-    let truth = volery_reference::render(grid, &view.camera, &view.transfer, view.background, width, height)?;
+    let View { camera, transfer, background, .. } = &view;
+    let truth = match plane {
+        None => volery_reference::render(grid, camera, transfer, *background, width, height)?,
+        Some(plane) => {
+            let planes = &[plane];
+            let scene = PlaneScene { grid, planes, transfer, nearest: false, is_transparent: false };
+            scene.render(camera, *background, [width, height], &|_| {})?
+        }
+    };
 
     let described = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width}, 3), }}");
     // Magic, version and length take 10 bytes; the header ends with a line break on a multiple of 64.
@@ -29,4 +43,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     bytes.extend(truth.pixels().iter().flatten().flat_map(|&channel| (channel as f32).to_le_bytes()));
     fs::write(output, bytes)?;
     Ok(())
+}
+
+fn parse_plane(text: &str) -> Result<Plane, Box<dyn Error>> {
+    let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>()?;
+    let [x, y, z, distance] = numbers[..] else { return Err("expected NX,NY,NZ,D".into()) };
+    Ok(Plane { normal: DVec3::new(x, y, z), distance })
 }

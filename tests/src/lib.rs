@@ -8,7 +8,13 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use volery::{Backend, BackendChoice, Image, Input, Picture, Session, View, open_backend, read_input};
+use volery::{
+    Backend, BackendChoice, Image, Input, Picture, PlaneView, Session, Thickness, View, open_backend,
+    read_input,
+};
+use volery_frame::{
+    Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, UploadError, VolumeLayout,
+};
 use volery_reference::metrics::{Comparison, compare};
 use volery_scene::VoxelGrid;
 
@@ -59,6 +65,8 @@ pub fn view_of(input: &Input) -> View {
         transfer: scene.transfer.clone(),
         background: scene.background,
         tolerance: None,
+        planes: PlaneView::default(),
+        thickness: Thickness::default(),
     }
 }
 
@@ -132,4 +140,37 @@ pub fn distance(what: &str, left: &volery_reference::Image, right: &volery_refer
 pub fn at_most(what: &str, measured: f64, threshold: f64) {
     println!("{what}: {measured:.3e}, at most {threshold:.3e}");
     assert!(measured <= threshold, "{what}: {measured:e}, expected at most {threshold:e}");
+}
+
+/// Draws planes as if no node touched a coarser one: what blending is there for.
+pub struct Unblended<B>(pub B);
+
+impl<B: Backend> Backend for Unblended<B> {
+    fn device(&self) -> Device {
+        self.0.device()
+    }
+
+    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
+        self.0.set_volume(layout)
+    }
+
+    fn is_resident(&self, id: BrickId) -> bool {
+        self.0.is_resident(id)
+    }
+
+    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
+        self.0.upload(bricks)
+    }
+
+    fn resident_bytes(&self) -> u64 {
+        self.0.resident_bytes()
+    }
+
+    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
+        let Content::Planes(planes) = frame.content else { return self.0.draw(frame) };
+        let mut bricks = planes.bricks.to_vec();
+        bricks.iter_mut().for_each(|brick| brick.low_corners = 0);
+        let content = Content::Planes(Planes { bricks: &bricks, ..planes });
+        self.0.draw(&Frame { content, ..frame.clone() })
+    }
 }

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::builder::{OsStringValueParser, PathBufValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use volery::fit::Direction;
-use volery::{BackendChoice, Preset};
+use volery::glam::DVec3;
+use volery::{BackendChoice, Plane, Preset, Thickness};
 
 /// Draws scientific volumes and says how far the picture is from the truth.
 #[derive(Debug, Parser)]
@@ -35,6 +36,8 @@ pub(crate) enum Command {
   volery render head.nii.gz -o head.png
   volery render engine_256x256x128_uint8.raw -o engine.exr --view 35,20,1.5 --transfer viridis
   volery render scene.json --data volumes -o scene.png --tolerance 0.02 --verify --report scene.report.json
+  volery render head.nii.gz -o cut.png --technique plane --plane 0.3,0.5,0.81,120 --focus 90,80,60
+  volery render photo.png -o focus.png --technique plane --focus 200,150 --show-nodes
 
 Transfer functions by name: auto, ramp, ct-bone, ct-soft-tissue (both in Hounsfield units), mri,
 and the colour maps grayscale, viridis, inferno, plasma, magma, turbo, cool-to-warm, black-body.
@@ -67,6 +70,11 @@ pub(crate) struct RenderArgs {
     /// Largest difference of a value from the full resolution, as a fraction of the file's value range
     #[arg(long, value_name = "T", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
+    /// How the length of a ray in a cube is found (technique fans)
+    #[arg(long, value_enum, default_value_t = ThicknessName::Exact)]
+    pub(crate) thickness: ThicknessName,
+    #[command(flatten)]
+    pub(crate) planes: PlaneArgs,
     /// Folder that the paths in a scene file are relative to [default: that of the scene file]
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
@@ -86,6 +94,38 @@ pub(crate) struct RenderArgs {
     /// Draw the picture so often, and report the time of each and their median
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) frames: u32,
+}
+
+/// What the technique plane alone reads.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Technique plane")]
+pub(crate) struct PlaneArgs {
+    /// The plane of all points x with (NX,NY,NZ) . x = D in world units; may be given several times
+    /// [default: the image, or three planes through the middle of the volume]
+    #[arg(long = "plane", value_name = "NX,NY,NZ,D", value_parser = parse_plane, allow_hyphen_values = true)]
+    pub(crate) planes: Vec<Plane>,
+    /// Full detail at this world position, less elsewhere
+    #[arg(long, value_name = "X,Y[,Z]", value_parser = parse_focus, allow_hyphen_values = true)]
+    pub(crate) focus: Option<DVec3>,
+    /// Draw a node where its centre is farther from the focus than so many of its diagonals
+    #[arg(long, value_name = "Q", requires = "focus", default_value_t = 1.0, value_parser = parse_quality,
+        allow_negative_numbers = true)]
+    pub(crate) quality: f64,
+    /// Largest difference of any colour channel from the full resolution, in [0, 1]
+    #[arg(long, value_name = "E", value_parser = parse_error, allow_negative_numbers = true)]
+    pub(crate) error: Option<f64>,
+    /// Let light through where the transfer function's opacity is below 1
+    #[arg(long)]
+    pub(crate) transparent: bool,
+    /// Show the nearest sample in place of interpolating
+    #[arg(long)]
+    pub(crate) nearest: bool,
+    /// Outline the nodes of the cut in the colour of their level: black, red, green, yellow, ...
+    #[arg(long)]
+    pub(crate) show_nodes: bool,
+    /// Write a picture and its report into this folder each time that more of the data has arrived
+    #[arg(long, value_name = "DIR")]
+    pub(crate) progressive: Option<PathBuf>,
 }
 
 /// `volery info`
@@ -120,10 +160,32 @@ pub(crate) struct DemoArgs {
 /// How to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Technique {
-    /// What suits the input: raycast for volumes
+    /// What suits the input: raycast for volumes, plane for images and colours
     Auto,
     /// One ray per pixel through the nodes of a cut
     Raycast,
+    /// Cutting planes through the nodes of a cut
+    Plane,
+    /// Cubes of constant value, as triangle fans from back to front
+    Fans,
+}
+
+/// How the length of a ray in a cube is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ThicknessName {
+    /// The exact chord, per fragment
+    Exact,
+    /// Linear on the screen between the corners of triangles
+    Interpolated,
+}
+
+impl From<ThicknessName> for Thickness {
+    fn from(name: ThicknessName) -> Self {
+        match name {
+            ThicknessName::Exact => Self::Exact,
+            ThicknessName::Interpolated => Self::Interpolated,
+        }
+    }
 }
 
 /// Who draws.
@@ -188,6 +250,42 @@ fn parse_tolerance(text: &str) -> Result<f64, String> {
     let found: Option<f64> = text.parse().ok();
     let good = found.filter(|tolerance| (0.0..=1.0).contains(tolerance));
     good.ok_or_else(|| "expected a fraction of the value range, from 0 to 1".to_owned())
+}
+
+/// As many numbers as `text` has between commas.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(|part| part.trim().parse().ok()).collect()
+}
+
+fn parse_plane(text: &str) -> Result<Plane, String> {
+    let expected = "expected NX,NY,NZ,D: a normal of length above 0, and a number";
+    let numbers = numbers(text);
+    let Some(&[x, y, z, distance]) = numbers.as_deref() else { return Err(expected.to_owned()) };
+    let plane = Plane { normal: DVec3::new(x, y, z), distance };
+    match plane.defects().first() {
+        None => Ok(plane),
+        Some(defect) => Err(defect.to_string()),
+    }
+}
+
+fn parse_focus(text: &str) -> Result<DVec3, String> {
+    let point = match numbers(text).as_deref() {
+        Some(&[x, y]) => Some(DVec3::new(x, y, 0.0)),
+        Some(&[x, y, z]) => Some(DVec3::new(x, y, z)),
+        _ => None,
+    };
+    point.filter(|point| point.is_finite()).ok_or_else(|| "expected X,Y or X,Y,Z in world units".to_owned())
+}
+
+fn parse_quality(text: &str) -> Result<f64, String> {
+    let found: Option<f64> = text.parse().ok();
+    found.filter(|quality| *quality >= 0.0).ok_or_else(|| "expected a number of at least 0".to_owned())
+}
+
+fn parse_error(text: &str) -> Result<f64, String> {
+    let found: Option<f64> = text.parse().ok();
+    let good = found.filter(|error| (0.0..=1.0).contains(error));
+    good.ok_or_else(|| "expected a difference of colours, from 0 to 1".to_owned())
 }
 
 fn parse_transfer(name: std::ffi::OsString) -> Result<Transfer, String> {

@@ -1,16 +1,20 @@
 //! `volery info`
 
-use volery::{Info, read_input};
+use volery::{GridInfo, Info, read_input};
 
 use crate::args::InfoArgs;
 use crate::progress::Progress;
 use crate::{Failure, say};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
-    let info = {
-        let _busy = Progress::spinner("reading");
-        Info::of(&read_input(&args.input, args.data.as_deref())?.volume)
+    let busy = Progress::spinner("reading");
+    let text = if volery::io::is_grid(&args.input) {
+        let info = GridInfo::read(&args.input)?;
+        if args.json { serde_json::to_string_pretty(&info)? } else { info.to_string() }
+    } else {
+        let info = Info::of(&read_input(&args.input, args.data.as_deref())?.volume);
+        if args.json { serde_json::to_string_pretty(&info)? } else { info.to_string() }
     };
-    let text = if args.json { serde_json::to_string_pretty(&info)? } else { info.to_string() };
+    drop(busy);
     say(text.trim_end())
 }

@@ -8,12 +8,16 @@ use volery::io::transfer::TransferOptions;
 use volery::io::{read_transfer, write_atomically};
 use volery::output::{ErrorMap, write_image};
 use volery::{
-    Input, Picture, Report, Session, TransferFunction, View, ViewOptions, open_backend, read_input,
+    Focus, Input, Picture, PlaneView, Report, Sampling, Session, TransferFunction, View, ViewOptions,
+    open_backend, read_input,
 };
 
-use crate::args::{RenderArgs, Technique, Transfer};
+use crate::args::{PlaneArgs, RenderArgs, Technique, Transfer};
 use crate::progress::Progress;
 use crate::{Failure, say};
+
+/// Pictures that `--progressive` writes, about.
+const PROGRESSIVE_STEPS: usize = 8;
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let backend = open_backend(args.backend.into())?;
@@ -21,25 +25,32 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         let _busy = Progress::spinner("reading");
         read_input(&args.input, args.data.as_deref())?
     };
+    let grid = &input.volume.grid;
+    let technique = match args.technique {
+        Technique::Auto => volery::Technique::suiting(grid),
+        Technique::Raycast => volery::Technique::Raycast,
+        Technique::Plane => volery::Technique::Plane,
+        Technique::Fans => volery::Technique::Fans,
+    };
     let mut session = {
         let _busy = Progress::spinner("building the pyramid");
         let of_file = |error| Failure(format!("{}: {error}", input.path.display()));
-        Session::open(input.volume.grid.clone(), backend).map_err(of_file)?
+        Session::open(grid.clone(), backend, technique).map_err(of_file)?
     };
     let view = view(args, &input, &session)?;
+    if let Some(folder) = &args.planes.progressive {
+        progressive(folder, &mut session, &view, &input)?;
+    }
     let mut picture = {
         let _busy = Progress::spinner("drawing");
-        match args.technique {
-            Technique::Auto | Technique::Raycast => session.render_frames(&view, args.frames as usize)?,
-        }
+        session.render_frames(&view, args.frames as usize)?
     };
     picture.report.input.path = Some(input.path.to_string_lossy().into_owned());
     picture.report.seconds.load = Some(input.load_seconds);
     write_image(&args.output, &picture.image)?;
     let error_map = verify(args, &session, &view, &mut picture)?;
     if let Some(path) = &args.report {
-        let json = picture.report.to_json();
-        write_atomically(path, |file| std::io::Write::write_all(file, json.as_bytes()))?;
+        write_report(path, &picture.report)?;
     }
     say(summary(&args.output, &picture.report))?;
     if let Some(line) = error_map {
@@ -54,31 +65,71 @@ fn view(args: &RenderArgs, input: &Input, session: &Session) -> Result<View, Fai
     let defaults = ViewOptions::default();
     let [width, height] =
         args.size.or(scene.map(|scene| scene.size)).unwrap_or([defaults.width, defaults.height]);
-    let options = |direction: Direction, transfer| ViewOptions {
+    let options = |direction: Option<Direction>, transfer| ViewOptions {
         width,
         height,
         direction,
         orthographic: args.orthographic,
         transfer,
+        planes: planes(&args.planes),
     };
     let mut view = match (scene, args.view) {
-        (None, direction) => session.view(&options(direction.unwrap_or_default(), transfer)),
+        (None, direction) => session.view(&options(direction, transfer)),
         (Some(scene), Some(direction)) => {
             let transfer = transfer.unwrap_or_else(|| scene.transfer.clone());
-            let view = session.view(&options(direction, Some(transfer)));
+            let view = session.view(&options(Some(direction), Some(transfer)));
             View { background: scene.background, ..view }
         }
-        (Some(scene), None) => View {
-            width,
-            height,
-            camera: if args.orthographic { fit::orthographic(&scene.camera) } else { scene.camera },
-            transfer: transfer.unwrap_or_else(|| scene.transfer.clone()),
-            background: scene.background,
-            tolerance: None,
-        },
+        (Some(scene), None) => {
+            let transfer = transfer.unwrap_or_else(|| scene.transfer.clone());
+            let view = session.view(&options(None, Some(transfer)));
+            let camera = if args.orthographic { fit::orthographic(&scene.camera) } else { scene.camera };
+            View { camera, background: scene.background, ..view }
+        }
     };
     view.tolerance = args.tolerance;
+    view.thickness = args.thickness.into();
     Ok(view)
+}
+
+fn planes(args: &PlaneArgs) -> PlaneView {
+    PlaneView {
+        planes: args.planes.clone(),
+        focus: args.focus.map(|point| Focus { point, quality: args.quality }),
+        max_error: args.error,
+        sampling: if args.nearest { Sampling::Nearest } else { Sampling::Linear },
+        is_transparent: args.transparent,
+        shows_nodes: args.show_nodes,
+    }
+}
+
+/// Writes each picture on the way to the last one, `00.png` first, with its report beside it.
+fn progressive(folder: &Path, session: &mut Session, view: &View, input: &Input) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure(format!("{}: cannot be made: {error}", folder.display())))?;
+    let num_bricks = session.progressive(view, None, 1)?.num_bricks();
+    let steps = session.progressive(view, None, num_bricks.div_ceil(PROGRESSIVE_STEPS))?;
+    for (number, step) in steps.enumerate() {
+        let Picture { image, mut report } = step?.picture;
+        report.input.path = Some(input.path.to_string_lossy().into_owned());
+        let path = folder.join(format!("{number:02}.png"));
+        write_image(&path, &image)?;
+        write_report(&path.with_extension("json"), &report)?;
+        say(format_args!(
+            "{}: {} nodes, {} bricks more, colours within {:.4}",
+            path.display(),
+            report.work.nodes,
+            report.work.bricks,
+            report.error.and_then(|error| error.bound_max).unwrap_or_default(),
+        ))?;
+    }
+    Ok(())
+}
+
+fn write_report(path: &Path, report: &Report) -> Result<(), Failure> {
+    let json = report.to_json();
+    write_atomically(path, |file| std::io::Write::write_all(file, json.as_bytes()))?;
+    Ok(())
 }
 
 fn load_transfer(transfer: &Transfer, session: &Session) -> Result<TransferFunction, Failure> {
@@ -130,9 +181,13 @@ pub(crate) fn summary(output: &Path, report: &Report) -> String {
         report.work.nodes,
         megabytes(report.work.bytes_resident),
     );
-    if let Some(error) = &report.error {
-        let rmse = error.measured_rmse;
-        text += &format!("\nerror: max {:.5}, rmse {rmse:.6} against {}", error.measured_max, error.against);
+    let error = report.error.unwrap_or_default();
+    if let Some(bound) = error.bound_max {
+        text += &format!("\nbound: no colour differs by more than {bound:.5} from full resolution");
+    }
+    if let Some(found) = error.measured {
+        let rmse = found.measured_rmse;
+        text += &format!("\nerror: max {:.5}, rmse {rmse:.6} against {}", found.measured_max, found.against);
     }
     text
 }

@@ -78,6 +78,37 @@ fn inputs_that_cannot_be_read_are_status_1() {
     }
 }
 
+const TETRAHEDRON: &str = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n\
+    POINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\n\
+    SCALARS p float\nLOOKUP_TABLE default\n1 2 3 4\n";
+
+#[test]
+fn grids_are_described_or_refused_in_one_line() {
+    let shop = Workshop::new();
+    shop.write("good.vtk", TETRAHEDRON);
+    fails(&shop, "render good.vtk -o a.png", 1, &["good.vtk", "unstructured grid", "cannot be drawn yet"]);
+    let text = shop.done("info good.vtk").stdout;
+    for line in
+        ["kind      grid, legacy VTK", "points    4", "cells     1 tetrahedron", "p on points: f32, 1 to 4"]
+    {
+        assert!(text.contains(line), "{text}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&shop.done("info good.vtk --json").stdout).unwrap();
+    assert_eq!((&json["kind"], &json["cells"]["tetrahedron"]), (&json!("grid"), &json!(1)));
+    assert_eq!(json["bounds"], json!([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]));
+    for (from, to, words) in [
+        ("4 0 1 2 3", "4 0 1 2 4", &["CELLS: node is 4"][..]),
+        ("4 0 1 2 3", "4 0 1 2 -3", &["CELLS: node is -3"]),
+        ("CELLS 1 5", "CELLS 1 6", &["bad.vtk"]),
+        ("\n10\n", "\n5\n", &["number of cells is 0", "at least one that has volume"]),
+        ("POINTS 4", "POINTS 5000000000", &["POINTS: "]),
+        ("UNSTRUCTURED_GRID", "STRUCTURED_POINTS", &["STRUCTURED_POINTS", "expected UNSTRUCTURED_GRID"]),
+    ] {
+        shop.write("bad.vtk", TETRAHEDRON.replacen(from, to, 1));
+        fails(&shop, "info bad.vtk", 1, &[words, &["bad.vtk"]].concat());
+    }
+}
+
 #[test]
 fn scenes_that_make_no_sense_are_status_1() {
     let shop = Workshop::new();

@@ -1,6 +1,6 @@
 //! The trait of executors.
 
-use crate::{Brick, BrickId, Frame, VolumeLayout};
+use crate::{Brick, BrickId, Content, Frame, TexelType, VolumeLayout, planes};
 
 /// A picture in linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,6 +108,25 @@ pub enum DrawError {
         /// Most pixels per axis.
         max: u32,
     },
+    /// Rays through texels that have no extinction.
+    #[error("draw: rays through texels that are colours, expected texels of type U8, U16 or F32")]
+    RaysThroughColors,
+    /// More planes than a frame may have.
+    #[error("draw: {found} planes, expected at most {max}")]
+    TooManyPlanes {
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        max: usize,
+    },
+    /// A plane that is none.
+    #[error("draw: plane {index}: {defects}")]
+    Plane {
+        /// Which plane.
+        index: usize,
+        /// Everything that is wrong with it.
+        defects: String,
+    },
     /// The device failed.
     #[error("device: {0}")]
     Device(String),
@@ -143,16 +162,23 @@ pub trait Backend: Send {
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError>;
 }
 
-/// Checks that every backend makes before it draws: placement and size.
+/// Checks that every backend makes before it draws: size, placement of bricks, planes, and whether the texels are
+/// what the content needs.
 ///
 /// # Errors
-/// [`DrawError::Size`] or [`DrawError::Misplaced`].
+/// [`DrawError::Size`], [`DrawError::Misplaced`], [`DrawError::RaysThroughColors`], [`DrawError::TooManyPlanes`] or
+/// [`DrawError::Plane`].
 pub fn check_frame(frame: &Frame<'_>, layout: &VolumeLayout, max_size: u32) -> Result<(), DrawError> {
     let (width, height) = (frame.width, frame.height);
     if !(1..=max_size).contains(&width) || !(1..=max_size).contains(&height) {
         return Err(DrawError::Size { width, height, max: max_size });
     }
-    for brick in frame.bricks {
+    match &frame.content {
+        Content::Rays(_) if layout.texel == TexelType::Rgba8 => return Err(DrawError::RaysThroughColors),
+        Content::Rays(_) | Content::Cubes(_) => {}
+        Content::Planes(content) => planes::check(content.planes)?,
+    }
+    for brick in frame.content.bricks() {
         let size = layout
             .brick_cells
             .checked_shl(brick.level)

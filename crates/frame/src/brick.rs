@@ -6,7 +6,8 @@ use glam::DVec3;
 /// of `2^l` finest cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeLayout {
-    /// Finest cells along x, y, z: samples less one. Zero along an axis leaves nothing to integrate.
+    /// Finest cells along x, y, z: samples less one. Zero along an axis leaves nothing to integrate; a
+    /// plane along it shows an image.
     pub cells: [u32; 3],
     /// World size of a finest cell.
     pub spacing: DVec3,
@@ -31,6 +32,9 @@ pub enum TexelType {
     U16,
     /// 32 bits, float; NaN is blank: a cell with a blank corner holds no matter.
     F32,
+    /// A colour and its opacity, straight, 8 bits each, 255 for 1: for cutting planes, as it has no extinction.
+    /// `value_scale` and the like are not read.
+    Rgba8,
 }
 
 impl TexelType {
@@ -39,7 +43,7 @@ impl TexelType {
         match self {
             Self::U8 => 1,
             Self::U16 => 2,
-            Self::F32 => 4,
+            Self::F32 | Self::Rgba8 => 4,
         }
     }
 }
@@ -53,6 +57,8 @@ pub enum Texels<'a> {
     U16(&'a [u16]),
     /// 32 bits, float.
     F32(&'a [f32]),
+    /// Red, green, blue, opacity.
+    Rgba8(&'a [[u8; 4]]),
 }
 
 impl Texels<'_> {
@@ -62,6 +68,7 @@ impl Texels<'_> {
             Self::U8(_) => TexelType::U8,
             Self::U16(_) => TexelType::U16,
             Self::F32(_) => TexelType::F32,
+            Self::Rgba8(_) => TexelType::Rgba8,
         }
     }
 
@@ -71,6 +78,7 @@ impl Texels<'_> {
             Self::U8(texels) => texels.len(),
             Self::U16(texels) => texels.len(),
             Self::F32(texels) => texels.len(),
+            Self::Rgba8(texels) => texels.len(),
         }
     }
 

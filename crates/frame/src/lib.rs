@@ -22,13 +22,21 @@
 
 pub mod backend;
 pub mod brick;
+pub mod brick_grid;
 #[cfg(feature = "conformance")]
 pub mod conformance;
+pub mod cubes;
 pub mod integral;
+pub mod plane_tiles;
+pub mod planes;
 
 pub use backend::{Backend, Device, DeviceKind, DrawError, Drawn, Image, UploadError};
 pub use brick::{Brick, BrickId, PlacedBrick, TexelType, Texels, VolumeLayout};
+pub use brick_grid::BrickGrid;
+pub use cubes::{Cube, Cubes, Thickness};
 pub use integral::IntegratedTransfer;
+pub use plane_tiles::{PlaneTile, PlaneTiles};
+pub use planes::{BlendedBrick, Planes, PointTransfer, Sampling};
 
 use volery_scene::Camera;
 
@@ -41,10 +49,40 @@ pub struct Frame<'a> {
     pub height: u32,
     /// Where the picture is taken from; without defects.
     pub camera: Camera,
+    /// Linear RGB behind everything.
+    pub background: [f32; 3],
+    /// What is to be seen.
+    pub content: Content<'a>,
+}
+
+/// What is to be seen of a volume.
+#[derive(Clone, Copy, Debug)]
+pub enum Content<'a> {
+    /// Its matter, along one ray per pixel.
+    Rays(Rays<'a>),
+    /// Cutting planes through it.
+    Planes(Planes<'a>),
+    /// Cubes of constant colour and extinction.
+    Cubes(Cubes<'a>),
+}
+
+impl Content<'_> {
+    /// The bricks that must be resident.
+    pub fn bricks(&self) -> impl Iterator<Item = &PlacedBrick> {
+        let (rays, planes): (&[PlacedBrick], &[BlendedBrick]) = match self {
+            Self::Rays(rays) => (rays.bricks, &[]),
+            Self::Planes(planes) => (&[], planes.bricks),
+            Self::Cubes(_) => (&[], &[]),
+        };
+        rays.iter().chain(planes.iter().map(|brick| &brick.placed))
+    }
+}
+
+/// Emitting and absorbing matter, integrated along one ray per pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Rays<'a> {
     /// Colour and extinction, made for the layout's value range.
     pub transfer: &'a IntegratedTransfer,
-    /// Linear RGB behind the volume.
-    pub background: [f32; 3],
     /// What to draw, front to back: no brick hides one that comes before it. Bricks do not overlap; what
     /// no brick covers is empty.
     pub bricks: &'a [PlacedBrick],

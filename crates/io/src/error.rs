@@ -4,7 +4,7 @@ use std::fmt::{self, Display};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file that could not be read as a volume.
+/// A file that could not be read as a volume or grid.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", OneLine(.path.display()))]
 pub struct ReadError {
@@ -73,9 +73,20 @@ pub enum Problem {
         /// What is wrong with it.
         problem: Box<Problem>,
     },
+    /// One of the arrays of a file has a problem.
+    #[error("{array}: {problem}")]
+    Array {
+        /// The array by the name that the file or its format gives it.
+        array: String,
+        /// What is wrong with it.
+        problem: Box<Problem>,
+    },
     /// Dims, spacing and samples make no grid.
     #[error("{0}")]
     Grid(volery_scene::grid::Error),
+    /// Points, cells and values make no unstructured grid.
+    #[error("{0}")]
+    Cells(volery_scene::unstructured::Error),
 }
 
 impl Problem {
@@ -89,6 +100,10 @@ impl Problem {
 
     pub(crate) fn damaged(what: &'static str, message: impl Display) -> Self {
         Self::Damaged { what, message: shorten(message) }
+    }
+
+    pub(crate) fn of_array(self, array: impl Display) -> Self {
+        Self::Array { array: shorten(array), problem: Box::new(self) }
     }
 
     pub(crate) fn of_part(self, path: &Path) -> Self {

@@ -23,13 +23,16 @@ impl ByteOrder {
 
     /// Turns scalars of this order into the machine's, in place.
     pub(crate) fn to_native(self, bytes: &mut [u8], sample: SampleType) {
-        if self == Self::NATIVE {
-            return;
-        }
-        match swap_scalars(sample) {
-            Some(2) => reverse_each::<2>(bytes),
-            Some(4) => reverse_each::<4>(bytes),
-            Some(8) => reverse_each::<8>(bytes),
+        self.scalars_to_native(bytes, swap_scalars(sample).unwrap_or(1));
+    }
+
+    /// The same for scalars of so many bytes.
+    pub(crate) fn scalars_to_native(self, bytes: &mut [u8], scalar_bytes: usize) {
+        match scalar_bytes {
+            _ if self == Self::NATIVE => {}
+            2 => reverse_each::<2>(bytes),
+            4 => reverse_each::<4>(bytes),
+            8 => reverse_each::<8>(bytes),
             _ => {}
         }
     }

@@ -1,15 +1,19 @@
-//! Files in, files out: volumes, images, scene files, transfer functions.
+//! Files in, files out: volumes, unstructured grids, images, scene files, transfer functions.
 //!
 //! [`read_volume`] reads raw, NIfTI-1, NRRD, MetaImage, VTK image data, TIFF, PNG, JPEG and folders of
-//! slices into a [`VoxelGrid`](volery_scene::VoxelGrid); [`SceneFile`] and [`ColorMap`] read what to draw;
+//! slices into a [`VoxelGrid`](volery_scene::VoxelGrid); [`read_grid`] reads VTK's XML and legacy unstructured
+//! grids, also in parallel pieces, and Exodus II in netCDF-3 into an
+//! [`UnstructuredGrid`](volery_scene::UnstructuredGrid); [`SceneFile`] and [`ColorMap`] read what to draw;
 //! [`write_png`], [`write_exr`] and [`write_nrrd`] save, through [`write_atomically`].
 //!
 //! # Guarantees
 //! - *No file is believed.* Every size is checked against the file, the address range and
-//!   [`ReadOptions::max_bytes`] before anything is allocated. What a stream yields is stored as it comes, in
-//!   at most twice the room (beside a decoder's own state; Zstandard's window is at most 128 MiB); an image
-//!   may be at most 4096 times its file. No input panics, and none is waited for: devices and pipes are
+//!   [`ReadOptions::max_bytes`] or [`GridOptions::max_bytes`] before anything is allocated; every node of a cell
+//!   exists. What a stream yields is stored as it comes, in
+//!   at most twice the room (beside a decoder's own state; the window of Zstandard is at most 128 MiB, the
+//!   dictionary of LZMA 64 MiB); an image may be at most 4096 times its file. No input panics, and none is waited for: devices and pipes are
 //!   refused. An error is one line: which file, which field, what was found, what was expected.
+//! - *Nothing is lost in silence.* Cells left out, values averaged, pieces joined: each is a note beside the data.
 //! - *No half file.* Output is written beside its place and renamed.
 //! - *No copy without need.* Large uncompressed files of the machine's byte order are mapped. They must not
 //!   be changed while the volume lives, as with every memory map.
@@ -19,17 +23,21 @@
 //! hold linear values without gamma, row 0 at the top.
 //!
 //! # Non-goals
-//! Unstructured grids and meshes; DICOM; colour maps by index.
+//! Opaque meshes; polyhedra and cells without volume; netCDF-4; DICOM; colour maps by index.
 
 mod bytes;
 mod error;
+pub mod grid;
 mod layout;
+mod numbers;
 mod out;
 pub mod scene_file;
 pub mod transfer;
 mod volume;
+mod vtk_xml;
 
 pub use error::{Problem, ReadError};
+pub use grid::{GridFile, GridOptions, is_grid, read_grid};
 pub use layout::{ByteOrder, Element, ParseElementError};
 pub use out::{Picture, WriteError, read_png_rgb, write_atomically, write_exr, write_nrrd, write_png};
 pub use scene_file::SceneFile;

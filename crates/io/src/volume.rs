@@ -200,7 +200,7 @@ fn magic_format(head: &[u8]) -> Option<Format> {
 }
 
 /// The name of a file in lower case; bytes that are not UTF-8 become replacement characters.
-fn lower_name(path: &Path) -> String {
+pub(crate) fn lower_name(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 

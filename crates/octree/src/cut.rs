@@ -4,6 +4,8 @@ use std::cmp::Ordering;
 
 use volery_pyramid::Node;
 
+use crate::balance::Leaf;
+
 /// Nodes that together cover the domain exactly once, some drawn, some skipped.
 ///
 /// Both lists are in *canonical order*: that of a depth-first walk which visits children x fastest, then y,
@@ -34,18 +36,5 @@ impl Cut {
 /// Compares two nodes by the canonical order: by the place of their first finest descendants along the
 /// walk, then coarser before finer.
 pub fn canonical_order(a: Node, b: Node) -> Ordering {
-    let place = |node: Node| node.index.map(|i| u64::from(i).checked_shl(node.level).unwrap_or(0));
-    let (place_a, place_b) = (place(a), place(b));
-    // The coarsest level at which they part decides; there the walk goes by z, then y, then x.
-    let mut order = Ordering::Equal;
-    let mut parted = 0;
-    for axis in (0..3).rev() {
-        let differing = place_a[axis] ^ place_b[axis];
-        // Whether the highest bit of `differing` is above that of `parted`.
-        if parted < differing && parted < (parted ^ differing) {
-            parted = differing;
-            order = place_a[axis].cmp(&place_b[axis]);
-        }
-    }
-    order.then(b.level.cmp(&a.level))
+    Leaf::from(a).canonical_order(Leaf::from(b))
 }

@@ -1,9 +1,10 @@
-//! The filters: data tolerance, view frustum, transparency.
+//! The filters: data tolerance, view frustum, transparency, cutting planes, point of interest.
 
 use glam::DVec3;
 use volery_pyramid::{Layout, Node, NodeSource};
-use volery_scene::{Camera, Projection, TransferFunction};
+use volery_scene::{Camera, Plane, Projection, TransferFunction};
 
+use crate::section::IndexPlane;
 use crate::select::{Answer, Filter};
 
 /// Draws a node whose data error is below a tolerance, else descends.
@@ -91,16 +92,86 @@ impl<'a> Frustum<'a> {
         // Positions, axes and dot products are each wrong by a few units of 2^-53 of the reach.
         Self { layout, planes: [(camera.eye, forward), a, b, c, d], slack: 1e-12 * reach }
     }
+
+    /// Whether rays may meet a box inside the domain, in world units.
+    pub fn may_meet(&self, [low, high]: [DVec3; 2]) -> bool {
+        // Nothing is outside of planes that are not numbers.
+        !self.planes.iter().any(|&(point, normal)| {
+            // The corner that lies deepest inside.
+            let deepest = DVec3::select(normal.cmpgt(DVec3::ZERO), high, low);
+            (deepest - point).dot(normal) < -self.slack
+        })
+    }
 }
 
 impl Filter for Frustum<'_> {
     fn answer(&mut self, node: Node) -> Answer {
-        let [low, high] = self.layout.world_bounds(node);
-        let outside = self.planes.iter().any(|&(point, normal)| {
-            // The corner that lies deepest inside.
-            let deepest = DVec3::select(normal.cmpgt(DVec3::ZERO), high, low);
-            (deepest - point).dot(normal) < -self.slack
+        if self.may_meet(self.layout.world_bounds(node)) { Answer::Draw } else { Answer::Skip }
+    }
+}
+
+/// Skips a node whose box none of the planes meets.
+///
+/// A plane that touches a box in a corner, an edge or a face meets it. So does one that passes within
+/// [`PLANE_SLACK`] of the domain's size: who draws finds the places of a plane in `f32`, perhaps just across a
+/// boundary, and there must be no hole. What each node has of the plane, without overlaps, says
+/// [`section`](crate::section). A plane with [defects](Plane::defects) is met by nothing.
+pub struct CuttingPlanes<'a> {
+    layout: &'a Layout,
+    /// Each with the offset below which it meets a box.
+    planes: Vec<(IndexPlane, f64)>,
+}
+
+/// How far from a box a plane counts as meeting it, in parts of the domain's size along the plane's normal.
+pub const PLANE_SLACK: f64 = 1e-6;
+
+impl<'a> CuttingPlanes<'a> {
+    /// The filter for planes in world space.
+    pub fn new(layout: &'a Layout, planes: &[Plane]) -> Self {
+        let valid = planes.iter().filter(|plane| plane.defects().is_empty());
+        let planes = valid.map(|plane| {
+            let index_plane = IndexPlane::new(layout, plane);
+            let [least, greatest] = index_plane.offsets([DVec3::ZERO, layout.domain()]);
+            (index_plane, PLANE_SLACK * (greatest - least) + 1e-14 * plane.distance.abs())
         });
-        if outside { Answer::Skip } else { Answer::Draw }
+        Self { layout, planes: planes.collect() }
+    }
+}
+
+impl Filter for CuttingPlanes<'_> {
+    fn answer(&mut self, node: Node) -> Answer {
+        let bounds = self.layout.bounds(node);
+        let misses = |&(plane, slack): &(IndexPlane, f64)| {
+            let [least, greatest] = plane.offsets(bounds);
+            least > slack || greatest < -slack
+        };
+        if self.planes.iter().all(misses) { Answer::Skip } else { Answer::Draw }
+    }
+}
+
+/// Draws a node that is far from a point of interest for its size, else descends.
+///
+/// Far is a distance, from the point to the centre of the node, greater than the node's diagonal times the
+/// quality, both in world space. (LaMar and others 2000 say greater in section 3.2 and smaller in section 4.1;
+/// smaller would be coarse where one looks.) So an octave of distance is a level, and twice the quality is twice
+/// the resolution. A node that the domain cuts short counts as what is left of it.
+///
+/// Quality 0, or less, draws the root; an infinite one is the full resolution. What is not a number lowers no
+/// resolution.
+pub struct Focus<'a> {
+    /// Of the tree.
+    pub layout: &'a Layout,
+    /// The point of interest in world space; it may lie outside the domain.
+    pub point: DVec3,
+    /// Diagonals of a node that it must be away to be drawn.
+    pub quality: f64,
+}
+
+impl Filter for Focus<'_> {
+    fn answer(&mut self, node: Node) -> Answer {
+        let [low, high] = self.layout.world_bounds(node);
+        let (diagonal, center) = ((high - low).length(), low + (high - low) / 2.0);
+        let is_far = self.point.distance(center) > diagonal * self.quality;
+        if node.level == 0 || is_far || self.quality <= 0.0 { Answer::Draw } else { Answer::Descend }
     }
 }

@@ -43,6 +43,7 @@
 
 mod analysis;
 pub mod brick;
+pub mod cubes;
 pub mod layout;
 mod levels;
 pub mod node;
@@ -51,6 +52,7 @@ pub mod source;
 pub mod stats;
 
 pub use brick::{Brick, BrickSamples, BrickShape};
+pub use cubes::{Cube, CubeTree};
 pub use layout::{Kind, Layout};
 pub use node::Node;
 pub use pyramid::Pyramid;

@@ -36,6 +36,11 @@ pub trait NodeSource: Send + Sync {
     /// When the layout does not [contain](Layout::contains) the node.
     fn stats(&self, node: Node) -> &[NodeStats];
 
+    /// Whether [`read_brick`](Self::read_brick) of this node returns at once rather than waits.
+    fn is_at_hand(&self, _node: Node) -> bool {
+        true
+    }
+
     /// Fills `brick` with the samples of the node's [shape](Layout::brick_shape), whatever it held before.
     ///
     /// # Errors

@@ -12,6 +12,8 @@
 //! (Splitting at control points: S. Weiss, R. Westermann, "Analytic ray splitting for controlled precision
 //! DVR", EuroVis 2021. The control of precision is Novins and Arvo's, 1992.)
 //!
+//! Cutting planes have their own truth, without any integral: [`PlaneScene`].
+//!
 //! # Guarantees
 //! - A pixel is within 1e-9 of the exact integral of the scene given, in colour differences of [0, 1]: an
 //!   interval is accepted when its estimated error is below [`PIECE_TOLERANCE`]. Away from poles of the
@@ -27,19 +29,21 @@
 //! only if one of them is blank). A domain without thickness along some axis holds no matter.
 //!
 //! # Non-goals
-//! Speed at the price of truth; colour volumes; unstructured grids (their truth comes with their issue).
+//! Speed at the price of truth; matter of colour samples; unstructured grids (their truth comes with their issue).
 
 mod cell;
 mod cubic;
 mod image;
 mod integral;
 pub mod metrics;
+mod planes;
 mod render;
 mod tracer;
 mod transfer;
 
 pub use image::{Image, SizeMismatch};
 pub use integral::{Light, PIECE_TOLERANCE};
+pub use planes::PlaneScene;
 pub use render::{Error, render};
 pub use tracer::Tracer;
 

@@ -52,6 +52,18 @@ pub fn render(
     Tracer::new(grid, transfer)?.render(camera, background, width, height, &|_| {})
 }
 
+/// Whether a picture can be taken.
+pub(crate) fn check_picture(camera: &Camera, width: u32, height: u32) -> Result<(), Error> {
+    let defects = camera.defects();
+    if !defects.is_empty() {
+        return Err(Error::Camera { defects });
+    }
+    if !(1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
+        return Err(Error::Size { width, height });
+    }
+    Ok(())
+}
+
 impl Tracer<'_> {
     /// [`render`], calling `progress` with the finished part of the picture, in [0, 1], after each row, from
     /// any thread.
@@ -66,13 +78,7 @@ impl Tracer<'_> {
         height: u32,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Image, Error> {
-        let defects = camera.defects();
-        if !defects.is_empty() {
-            return Err(Error::Camera { defects });
-        }
-        if !(1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
-            return Err(Error::Size { width, height });
-        }
+        check_picture(camera, width, height)?;
         let rays = camera.rays(width, height);
         let num_done = AtomicU32::new(0);
         let mut pixels = vec![[0.0; 3]; width as usize * height as usize];

@@ -1,4 +1,5 @@
-//! What Volery draws and from where: a [`VoxelGrid`], a [`Camera`], a [`TransferFunction`].
+//! What Volery draws and from where: a [`VoxelGrid`] or an [`UnstructuredGrid`], a [`Camera`], a
+//! [`TransferFunction`].
 //!
 //! Plain data and its validation, in `f64`; every other crate of Volery speaks in these types.
 //!
@@ -15,13 +16,17 @@
 
 pub mod camera;
 pub mod grid;
+pub mod plane;
 pub mod samples;
 pub mod transfer;
+pub mod unstructured;
 
 pub use camera::{Camera, Projection, Ray, RayGrid};
 pub use grid::VoxelGrid;
+pub use plane::Plane;
 pub use samples::{Array, Sample, SampleType, Samples};
 pub use transfer::{ControlPoint, TransferFunction};
+pub use unstructured::{CellType, Cells, UnstructuredGrid};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -20,6 +20,7 @@ pub(crate) const fn block_cells(brick_cells: u32) -> u32 {
 pub(crate) struct StoredBrick<T> {
     /// Along x, y, z.
     pub(crate) samples: [u32; 3],
+    /// X fastest; of colours first all reds, then all greens, blues and opacities.
     pub(crate) texels: Box<[T]>,
     /// Blocks along x, y, z.
     blocks: [u32; 3],
@@ -84,6 +85,14 @@ impl<T: Texel> StoredBrick<T> {
             }
         }
         (occupancy != [0; 64]).then_some(occupancy)
+    }
+}
+
+impl StoredBrick<u8> {
+    /// Of colours, through which no ray is cast: without ranges.
+    pub(crate) fn of_colors(samples: [u32; 3], texels: &[[u8; 4]]) -> Self {
+        let texels = (0..4).flat_map(|channel| texels.iter().map(move |texel| texel[channel])).collect();
+        Self { samples, texels, blocks: [0; 3], ranges: Box::new([]) }
     }
 }
 

@@ -15,6 +15,11 @@
 //! Empty space costs little: a brick keeps the range of each of its blocks, 8x8x8 of them; a frame marks those
 //! that may hold matter under its transfer function, 512 bits in one SIMD register; lanes leap over the others.
 //!
+//! Cutting planes need no walk: `plane` finds the place that each pixel of a packet sees of each plane, nearest
+//! first, and samples together the lanes that one brick holds; `plane_field` is that brick's field. An oblique plane
+//! through 512^3 samples of 8 bits (bench `plane`, 2 cores of a shared machine): 5.2 ms for 512x512 pixels, 15 ms for
+//! 1024x1024, within 2e-6 of f64.
+//!
 //! # Error
 //! A half cell is integrated as if the field were linear over it, a quarter where the cubic bends much: of second
 //! order in the size of a cell, and nothing at all along the axes, where the field is linear. The straight lines
@@ -28,8 +33,11 @@
 //! The same bits for any number of threads. No `unsafe`.
 
 mod brick;
+mod cubes;
 mod math;
 mod packet;
+mod plane;
+mod plane_field;
 mod pool;
 mod texel;
 mod tile;
@@ -38,7 +46,8 @@ mod walk;
 use fearless_simd::Level;
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Device, DeviceKind, DrawError, Drawn, Frame, Image, UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, UploadError,
+    VolumeLayout,
 };
 
 use crate::pool::{Pool, for_bricks};
@@ -111,7 +120,18 @@ impl Backend for SoftwareBackend {
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
         let (layout, pool) = self.volume.as_ref().ok_or(DrawError::NoVolume)?;
         check_frame(frame, layout, MAX_SIZE)?;
-        let pixels = for_bricks!(pool, |bricks| tile::draw(self.level, frame, layout, bricks))?;
+        let pixels = match &frame.content {
+            Content::Rays(rays) => {
+                for_bricks!(pool, |bricks| tile::draw(self.level, frame, rays, layout, bricks))?
+            }
+            Content::Cubes(content) => cubes::draw(self.level, frame, content, layout),
+            Content::Planes(planes) => match pool {
+                Pool::U8(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),
+                Pool::U16(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),
+                Pool::F32(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),
+                Pool::Colors(bricks) => plane::draw::<_, 4>(self.level, frame, planes, layout, bricks),
+            }?,
+        };
         let image = Image { width: frame.width, height: frame.height, pixels };
         Ok(Drawn { image, device_seconds: None })
     }

@@ -1,9 +1,10 @@
-//! The resident bricks, all of one texel type.
+//! The resident bricks, all of one texel type. Colours lie in four planes of bytes, so that what samples bytes
+//! samples them.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
-use volery_frame::{Brick, BrickId, TexelType};
+use volery_frame::{Brick, BrickId, TexelType, Texels};
 
 use crate::brick::StoredBrick;
 use crate::texel::Texel;
@@ -17,13 +18,14 @@ pub(crate) enum Pool {
     U8(Bricks<u8>),
     U16(Bricks<u16>),
     F32(Bricks<f32>),
+    Colors(Bricks<u8>),
 }
 
 /// Runs one generic expression for whatever type a pool holds.
 macro_rules! for_bricks {
     ($pool:expr, |$bricks:ident| $body:expr) => {
         match $pool {
-            $crate::pool::Pool::U8($bricks) => $body,
+            $crate::pool::Pool::U8($bricks) | $crate::pool::Pool::Colors($bricks) => $body,
             $crate::pool::Pool::U16($bricks) => $body,
             $crate::pool::Pool::F32($bricks) => $body,
         }
@@ -37,6 +39,7 @@ impl Pool {
             TexelType::U8 => Self::U8(HashMap::new()),
             TexelType::U16 => Self::U16(HashMap::new()),
             TexelType::F32 => Self::F32(HashMap::new()),
+            TexelType::Rgba8 => Self::Colors(HashMap::new()),
         }
     }
 
@@ -55,6 +58,15 @@ impl Pool {
                 T::of(brick.texels).map(|texels| (brick.id, StoredBrick::new(brick.samples, texels, block)))
             };
             new.par_iter().filter_map(store).collect()
+        }
+        if let Self::Colors(bricks) = self {
+            let store = |brick: &Brick<'_>| match brick.texels {
+                Texels::Rgba8(texels) => Some((brick.id, StoredBrick::of_colors(brick.samples, texels))),
+                _ => None,
+            };
+            let stored: Vec<_> = new.par_iter().filter_map(store).collect();
+            bricks.extend(stored);
+            return;
         }
         for_bricks!(self, |bricks| bricks.extend(stored(new, block)));
     }

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch, mask32x16, prelude::*};
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_frame::{DrawError, Frame, PlacedBrick, VolumeLayout};
+use volery_frame::{DrawError, Frame, IntegratedTransfer, PlacedBrick, Rays, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use crate::MIN_TRANSMITTANCE;
@@ -11,7 +11,7 @@ use crate::brick::{Occupancy, StoredBrick, block_cells};
 use crate::packet::{PACKET, Packet};
 use crate::pool::Bricks;
 use crate::texel::Texel;
-use crate::walk::{Light, Matter, Table, walk};
+use crate::walk::{Light, MIN_PAIR_BINS, Matter, Table, walk};
 
 /// Pixels of a tile per axis, a multiple of [`PACKET`].
 const TILE: u32 = 32;
@@ -25,6 +25,8 @@ struct Drawable<'a, T> {
     brick: &'a StoredBrick<T>,
     occupancy: Occupancy,
     level: u32,
+    /// Whether a cell may hold more optical depth than a pair of pieces takes, or the table has restarts.
+    needs_care: bool,
     /// Lower and upper corner in finest cells.
     bounds: [[f64; 3]; 2],
     /// First and last tile along x and y that its picture touches.
@@ -35,6 +37,8 @@ struct Drawable<'a, T> {
 struct Shared<'a, T> {
     frame: &'a Frame<'a>,
     layout: &'a VolumeLayout,
+    /// World length that the table's extinction refers to.
+    unit_length: f64,
     rays: RayGrid,
     table: Table<'a>,
     /// Front to back.
@@ -45,14 +49,15 @@ struct Shared<'a, T> {
 pub(crate) fn draw<T: Texel>(
     level: Level,
     frame: &Frame<'_>,
+    content: &Rays<'_>,
     layout: &VolumeLayout,
     bricks: &Bricks<T>,
 ) -> Result<Vec<[f32; 3]>, DrawError> {
-    let [scale, offset] = frame.transfer.bin_from_value();
+    let Rays { transfer, bricks: placed_bricks } = *content;
+    let [scale, offset] = transfer.bin_from_value();
     let bin_from_texel = [(scale * layout.value_scale) as f32, (scale * layout.value_offset + offset) as f32];
     let projector = Projector::new(frame, layout);
-    let stored: Vec<_> = frame
-        .bricks
+    let stored: Vec<_> = placed_bricks
         .iter()
         .map(|placed| {
             bricks.get(&placed.id).ok_or(DrawError::NotResident { id: placed.id }).map(|b| (placed, b))
@@ -60,12 +65,18 @@ pub(crate) fn draw<T: Texel>(
         .collect::<Result<_, _>>()?;
     let drawables = stored
         .into_par_iter()
-        .filter_map(|(placed, brick)| drawable(frame, layout, &projector, bin_from_texel, placed, brick))
+        .filter_map(|(placed, brick)| drawable(transfer, layout, &projector, bin_from_texel, placed, brick))
         .collect();
-    let max_bend = MAX_BEND * frame.transfer.num_bins() as f32 / bin_from_texel[0].abs();
-    let table = Table { entries: frame.transfer.entries(), bin_from_texel, max_bend };
+    let texels_per_bin = bin_from_texel[0].abs().recip();
+    let table = Table {
+        entries: transfer.entries(),
+        bin_from_texel,
+        max_bend: MAX_BEND * transfer.num_bins() as f32 * texels_per_bin,
+        min_pair: MIN_PAIR_BINS * texels_per_bin,
+        restarts: transfer.restarts(),
+    };
     let rays = frame.camera.rays(frame.width, frame.height);
-    let shared = Shared { frame, layout, rays, table, drawables };
+    let shared = Shared { frame, layout, unit_length: transfer.unit_length(), rays, table, drawables };
 
     let columns = frame.width.div_ceil(TILE);
     let tiles: Vec<Vec<[f32; 3]>> = (0..columns * frame.height.div_ceil(TILE))
@@ -84,7 +95,7 @@ pub(crate) fn draw<T: Texel>(
 }
 
 fn drawable<'a, T: Texel>(
-    frame: &Frame<'_>,
+    transfer: &IntegratedTransfer,
     layout: &VolumeLayout,
     projector: &Projector,
     bin_from_texel: [f32; 2],
@@ -97,8 +108,9 @@ fn drawable<'a, T: Texel>(
     let high = std::array::from_fn(|axis| f64::from(high[axis].min(held(axis))));
     let bounds = [low.map(f64::from), high];
     let tiles = projector.tiles(bounds)?;
-    let occupancy = brick.occupancy(frame.transfer, bin_from_texel)?;
-    Some(Drawable { brick, occupancy, level: placed.level, bounds, tiles })
+    let occupancy = brick.occupancy(transfer, bin_from_texel)?;
+    let needs_care = transfer.is_dense(layout, placed.level) || !transfer.restarts().is_empty();
+    Some(Drawable { brick, occupancy, level: placed.level, needs_care, bounds, tiles })
 }
 
 /// Finds the tiles that a box can touch.
@@ -207,7 +219,7 @@ fn draw_packet<S: Simd, T: Texel>(
     column: u32,
     row: u32,
 ) -> Light<S> {
-    let unit_length = shared.frame.transfer.unit_length();
+    let unit_length = shared.unit_length;
     let packet = Packet::new(simd, &shared.rays, shared.layout.spacing, unit_length, column, row);
     let mut light = Light::none(simd);
     let mut wanted = mask32x16::splat(simd, true);
@@ -221,7 +233,13 @@ fn draw_packet<S: Simd, T: Texel>(
         };
         simd.vectorize(
             #[inline(always)]
-            || walk(simd, &span, &matter, shared.table, &mut light),
+            || {
+                if drawable.needs_care {
+                    walk::<_, _, true>(simd, &span, &matter, shared.table, &mut light);
+                } else {
+                    walk::<_, _, false>(simd, &span, &matter, shared.table, &mut light);
+                }
+            },
         );
         wanted = light.transmittance.simd_gt(MIN_TRANSMITTANCE);
         if wanted.all_false() {

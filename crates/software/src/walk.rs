@@ -3,14 +3,30 @@
 //! Each lane goes from cell to cell of its own. Blocks without matter are leapt over first, until every lane
 //! that is still on its way stands in a block with matter; then all take one cell. In a cell the field along
 //! the ray is the cubic of a trilinear interpolant: eight corners, fetched once, give its value anywhere.
+//!
+//! Where a cell may hold much optical depth, the walk is *careful*: a lane whose pair of pieces is too thick waits
+//! for the next round, in which it takes only part of its cell. It also minds restarts of the integrals. Elsewhere
+//! both are left out of the code.
 
 use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
+
+use volery_frame::integral::Restart;
 
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::Occupancy;
 use crate::math::{axes, four, front_weight, opacity_of_depth};
 use crate::packet::Span;
 use crate::texel::Texel;
+
+/// A careful walk shortens pairs of pieces of more optical depth: colour and extinction may run far
+/// from straight within what is seen of it.
+const MAX_PAIR_DEPTH: f32 = 1.4;
+
+/// No pair is shortened that passes fewer bins, since its ends are rounded to bins.
+pub(crate) const MIN_PAIR_BINS: f32 = 64.0;
+
+/// Nor a pair that is shorter, in unit lengths: lanes must come on.
+const MIN_PAIR_LENGTH: f32 = 0.004;
 
 /// Light gathered so far.
 pub(crate) struct Light<S: Simd> {
@@ -37,6 +53,10 @@ pub(crate) struct Table<'a> {
     /// A cell in which twice the middle differs from the sum of the ends by more than this, in texels, is
     /// integrated in four pieces instead of two.
     pub(crate) max_bend: f32,
+    /// [`MIN_PAIR_BINS`] in texels.
+    pub(crate) min_pair: f32,
+    /// Where the integrals start anew.
+    pub(crate) restarts: &'a [Restart],
 }
 
 /// The integrals at one end of a piece.
@@ -65,6 +85,25 @@ impl Table<'_> {
         // Two ends in one bin count as one whole bin: 2k goes with 2k + 1.
         let bin = bin.simd_eq(from).select(bin ^ 1, bin);
         self.at(simd, bin)
+    }
+
+    /// What the integrals grow by between two ends, across restarts.
+    #[inline(always)]
+    fn change<S: Simd>(&self, simd: S, from: &End<S>, to: &End<S>) -> [f32x16<S>; 4] {
+        let (mut start, mut end) = (from.integrals, to.integrals);
+        for restart in self.restarts {
+            let bin = i32x16::splat(simd, restart.bin as i32);
+            let rises = from.bin.simd_lt(bin) & to.bin.simd_ge(bin);
+            let falls = to.bin.simd_lt(bin) & from.bin.simd_ge(bin);
+            for (channel, &sum) in restart.sums.iter().enumerate() {
+                start[channel] = rises.select(start[channel] - sum, start[channel]);
+                end[channel] = falls.select(end[channel] - sum, end[channel]);
+            }
+        }
+        four(
+            #[inline(always)]
+            |i| end[i] - start[i],
+        )
     }
 
     #[inline(always)]
@@ -107,17 +146,15 @@ impl<S: Simd> Light<S> {
         last: f32x16<S>,
         length: f32x16<S>,
     ) -> End<S> {
-        let middle = table.end(simd, middle, from.bin);
-        let last = table.end(simd, last, middle.bin);
-        self.add(simd, [&from, &middle, &last], length);
-        last
+        let pair = Pair::new(simd, table, from, middle, last, length);
+        self.add(simd, &pair.pieces);
+        pair.end
     }
 
-    /// Adds two neighbouring pieces of `length` each. What their mean colours differ by tells how the colour
+    /// Adds two neighbouring pieces of one length. What their mean colours differ by tells how the colour
     /// runs within each, so how much more of its front is seen than of its back.
     #[inline(always)]
-    fn add(&mut self, simd: S, ends: [&End<S>; 3], length: f32x16<S>) {
-        let pieces = [Piece::new(simd, ends[0], ends[1], length), Piece::new(simd, ends[1], ends[2], length)];
+    fn add(&mut self, simd: S, pieces: &[Piece<S>; 2]) {
         // Where one piece is much thinner than the other, its colour tells little of the other's.
         let (a, b) = (pieces[0].depth, pieces[1].depth);
         let (thin, thick) = (a.min(b), a.max(b));
@@ -153,16 +190,38 @@ struct Piece<S: Simd> {
     depth: f32x16<S>,
 }
 
+/// Two neighbouring pieces of one length.
+struct Pair<S: Simd> {
+    pieces: [Piece<S>; 2],
+    end: End<S>,
+}
+
+impl<S: Simd> Pair<S> {
+    /// Pieces of `length` each, from `from` over the value `middle` to the value `last`.
+    #[inline(always)]
+    fn new(
+        simd: S,
+        table: Table<'_>,
+        from: End<S>,
+        middle: f32x16<S>,
+        last: f32x16<S>,
+        length: f32x16<S>,
+    ) -> Self {
+        let middle = table.end(simd, middle, from.bin);
+        let end = table.end(simd, last, middle.bin);
+        let pieces =
+            [Piece::new(simd, table, &from, &middle, length), Piece::new(simd, table, &middle, &end, length)];
+        Self { pieces, end }
+    }
+}
+
 impl<S: Simd> Piece<S> {
     #[inline(always)]
-    fn new(simd: S, from: &End<S>, to: &End<S>, length: f32x16<S>) -> Self {
+    fn new(simd: S, table: Table<'_>, from: &End<S>, to: &End<S>, length: f32x16<S>) -> Self {
         let bins: f32x16<S> = (to.bin - from.bin).to_float();
-        let extinction = to.integrals[3] - from.integrals[3];
+        let [r, g, b, extinction] = table.change(simd, from, to);
         let inverse = extinction.simd_ne(0.0).select(1.0 / extinction, f32x16::splat(simd, 0.0));
-        let light = axes(
-            #[inline(always)]
-            |i| to.integrals[i] - from.integrals[i],
-        );
+        let light = [r, g, b];
         Self { light, inverse, depth: length * extinction / bins }
     }
 
@@ -186,6 +245,8 @@ struct Walker<'a, S: Simd> {
     /// Unit lengths from the entry.
     depth: f32x16<S>,
     active: mask32x16<S>,
+    /// The longest that the next round may take of a cell, in unit lengths.
+    reach: f32x16<S>,
 }
 
 impl<'a, S: Simd> Walker<'a, S> {
@@ -199,13 +260,31 @@ impl<'a, S: Simd> Walker<'a, S> {
             #[inline(always)]
             |axis| span.direction[axis].simd_gt(zero),
         );
-        Self { span, forward, cells, block: matter.block as f32, cell, depth: zero, active: span.active }
+        Self {
+            span,
+            forward,
+            cells,
+            block: matter.block as f32,
+            cell,
+            depth: zero,
+            active: span.active,
+            reach: f32x16::splat(simd, f32::INFINITY),
+        }
     }
 
     /// Depth of the plane `plane[axis]` along each axis.
     #[inline(always)]
     fn depth_of(&self, axis: usize, plane: f32x16<S>) -> f32x16<S> {
         (plane - self.span.entry[axis]) * self.span.inverse[axis]
+    }
+
+    /// Depth of the faces through which each lane may leave its cell.
+    #[inline(always)]
+    fn exits(&self) -> [f32x16<S>; 3] {
+        axes(
+            #[inline(always)]
+            |axis| self.depth_of(axis, self.forward[axis].select(self.cell[axis] + 1.0, self.cell[axis])),
+        )
     }
 
     /// Lanes that stand in a block without matter.
@@ -275,6 +354,28 @@ impl<'a, S: Simd> Walker<'a, S> {
         self.active = active;
     }
 
+    /// Lanes whose pair of pieces, over `values` and each `half` long, is too thick: their reach becomes shorter,
+    /// that of others longer.
+    #[inline(always)]
+    fn shorten(
+        &mut self,
+        simd: S,
+        table: Table<'_>,
+        from: End<S>,
+        [first, middle, last]: [f32x16<S>; 3],
+        half: f32x16<S>,
+    ) -> mask32x16<S> {
+        let pair = Pair::new(simd, table, from, balanced(first, middle, last), last, half);
+        let depth = pair.pieces[0].depth + pair.pieces[1].depth;
+        let passed = (middle - first).abs() + (last - middle).abs();
+        let thick = depth.simd_gt(MAX_PAIR_DEPTH)
+            & passed.simd_gt(table.min_pair)
+            & half.simd_gt(0.5 * MIN_PAIR_LENGTH);
+        let share = (1.5 * MAX_PAIR_DEPTH / depth).max(table.min_pair / passed);
+        self.reach = thick.select(half * share, self.reach + self.reach);
+        thick
+    }
+
     /// Position in the cell at `depth`, in [0, 1] along each axis.
     #[inline(always)]
     fn fraction(&self, simd: S, depth: f32x16<S>) -> [f32x16<S>; 3] {
@@ -334,9 +435,10 @@ fn balanced<S: Simd>(first: f32x16<S>, middle: f32x16<S>, last: f32x16<S>) -> f3
     one_way.select(moved.max(low).min(high), middle)
 }
 
-/// Adds the light of one brick to a packet.
+/// Adds the light of one brick to a packet. Unless the walk is `CAREFUL`, cells should not be dense,
+/// and the table must be without restarts.
 #[inline(always)]
-pub(crate) fn walk<S: Simd, T: Texel>(
+pub(crate) fn walk<S: Simd, T: Texel, const CAREFUL: bool>(
     simd: S,
     span: &Span<S>,
     matter: &Matter<'_, T>,
@@ -349,6 +451,7 @@ pub(crate) fn walk<S: Simd, T: Texel>(
     let rows = [0, row, slice, slice + row].map(|offset| &matter.texels[offset..offset + reach]);
     let (row, slice) = (f32x16::splat(simd, row as f32), f32x16::splat(simd, slice as f32));
     let zero = f32x16::splat(simd, 0.0);
+    let table = if CAREFUL { table } else { Table { restarts: &[], ..table } };
 
     let occupancy = u8x64::from_slice(simd, matter.occupancy);
     let mut walker = Walker::new(simd, span, matter);
@@ -372,14 +475,12 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         let address: i32x16<S> = z.mul_add(slice, y.mul_add(row, x)).to_int();
         let cell = Cell::new(T::corners(simd, rows, address));
 
-        let exit = axes(
-            #[inline(always)]
-            |axis| {
-                let plane = walker.forward[axis].select(walker.cell[axis] + 1.0, walker.cell[axis]);
-                walker.depth_of(axis, plane)
-            },
-        );
-        let end = exit[0].min(exit[1]).min(exit[2]).min(span.length).max(walker.depth);
+        let exit = walker.exits();
+        let mut end = exit[0].min(exit[1]).min(exit[2]).min(span.length);
+        if CAREFUL {
+            end = end.min(walker.depth + walker.reach);
+        }
+        let end = end.max(walker.depth);
         let half = (end - walker.depth) * 0.5;
         if fresh.any_true() {
             let value = cell.value(walker.fraction(simd, walker.depth));
@@ -390,7 +491,12 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         let last = cell.value(walker.fraction(simd, end));
         // A blank corner makes every value of its cell NaN or infinite.
         let blank = if T::CAN_BE_BLANK { !middle.is_finite() } else { mask32x16::splat(simd, false) };
-        let lanes = walker.active & !blank;
+        let mut lanes = walker.active & !blank;
+        let mut waits = mask32x16::splat(simd, false);
+        if CAREFUL {
+            waits = walker.shorten(simd, table, from, [first, middle, last], half) & lanes;
+            lanes &= !waits;
+        }
         let length = lanes.select(half, zero);
         let bend = (middle + middle - first - last).abs();
         if (bend.simd_gt(table.max_bend) & lanes).any_true() {
@@ -404,9 +510,9 @@ pub(crate) fn walk<S: Simd, T: Texel>(
             from = light.gather(simd, table, from, balanced(first, middle, last), last, length);
         }
         first = last;
-        fresh = blank;
-
-        walker.step(simd, &exit, end);
+        // Who waits finds its value again.
+        fresh = blank | waits;
+        walker.step(simd, &exit, if CAREFUL { waits.select(walker.depth, end) } else { end });
         walker.active &= light.transmittance.simd_gt(MIN_TRANSMITTANCE);
     }
 }

@@ -149,6 +149,25 @@ pub fn camera(boxes: &[[DVec3; 2]], direction: Direction, orthographic: bool, as
     Camera { eye: target - forward * distance, target, up: turned.up, projection }
 }
 
+/// A camera of parallel rays along `forward` that just shows all of some points, at least one.
+pub fn facing(points: &[DVec3], forward: DVec3, up: DVec3, aspect: f64) -> Camera {
+    let for_axes = Camera {
+        eye: -forward,
+        target: DVec3::ZERO,
+        up,
+        projection: Projection::Orthographic { height: 1.0 },
+    };
+    let [right, up, forward] = for_axes.axes();
+    let places = points.iter().map(|point| DVec3::new(point.dot(right), point.dot(up), point.dot(forward)));
+    let [low, high] = places
+        .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], place| [low.min(place), high.max(place)]);
+    let (middle, size) = ((low + high) / 2.0, high - low);
+    let target = right * middle.x + up * middle.y + forward * middle.z;
+    let height = size.y.max(size.x / aspect).max(f64::MIN_POSITIVE) / FILL;
+    let distance = size.length().max(f64::MIN_POSITIVE);
+    Camera { eye: target - forward * distance, target, up, projection: Projection::Orthographic { height } }
+}
+
 /// A camera of parallel rays that shows the plane through the target as large as `camera` does.
 pub fn orthographic(camera: &Camera) -> Camera {
     let height = match camera.projection {

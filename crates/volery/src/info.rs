@@ -7,6 +7,10 @@ use volery_io::Volume;
 
 use crate::histogram::Histogram;
 
+mod grid;
+
+pub use grid::{ArrayInfo, DefectInfo, GridInfo};
+
 /// Bins of the histogram in [`Info`].
 pub const NUM_BINS: usize = 32;
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use volery_io::scene_file::{InputKind, SceneError};
-use volery_io::{ReadError, ReadOptions, SceneFile, Volume, read_volume};
+use volery_io::{ReadError, ReadOptions, SceneFile, Volume, is_grid, read_volume};
 
 /// A volume as read, and its scene if it came with one.
 #[derive(Clone, Debug)]
@@ -28,10 +28,10 @@ pub enum InputError {
     /// The volume.
     #[error(transparent)]
     Volume(#[from] ReadError),
-    /// A scene of cells.
-    #[error("{}: input.kind is grid, expected volume: unstructured grids cannot be drawn yet", .path.display().to_string().escape_debug())]
+    /// A grid, or a scene of one.
+    #[error("{}: is an unstructured grid, expected a volume: grids cannot be drawn yet", .path.display().to_string().escape_debug())]
     Grid {
-        /// The scene file.
+        /// The grid or the scene file.
         path: PathBuf,
     },
 }
@@ -40,7 +40,7 @@ pub enum InputError {
 /// relative to `data_dir`, or else to the scene file's folder.
 ///
 /// # Errors
-/// When a file cannot be read, or the scene is of a grid.
+/// When a file cannot be read, or is a grid, or a scene of one.
 pub fn read_input(path: &Path, data_dir: Option<&Path>) -> Result<Input, InputError> {
     let start = Instant::now();
     let is_scene = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
@@ -52,6 +52,8 @@ pub fn read_input(path: &Path, data_dir: Option<&Path>) -> Result<Input, InputEr
         let folder = data_dir.unwrap_or_else(|| path.parent().unwrap_or(Path::new("")));
         let options = scene.input.read_options();
         (folder.join(&scene.input.file), Some(scene), options)
+    } else if path.is_file() && is_grid(path) {
+        return Err(InputError::Grid { path: path.to_owned() });
     } else {
         (path.to_owned(), None, ReadOptions::default())
     };

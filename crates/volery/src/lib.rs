@@ -13,13 +13,14 @@
 //! - The same bits for any number of threads.
 //! - A tolerance of 0 is the full resolution, bit for bit.
 //! - Beside the samples and what the backend keeps, drawing needs the coarse levels (1/7 of the samples) and
-//!   [`technique::raycast::BATCH_BYTES`].
+//!   [`technique::residency::BATCH_BYTES`].
 //! - No input panics. An error is one line that says what was found and what was expected.
 //!
 //! # Non-goals
 //! Lighting and shading; windows and interaction; unstructured grids, which come with their own issue.
 
 mod backend;
+pub mod error;
 pub mod fit;
 pub mod histogram;
 pub mod info;
@@ -33,18 +34,22 @@ pub mod transfer;
 
 pub use backend::{BackendChoice, BackendError, open_backend};
 pub use histogram::Histogram;
-pub use info::Info;
+pub use info::{GridInfo, Info};
 pub use input::{Input, InputError, read_input};
 pub use report::Report;
-pub use session::{BACKGROUND, OpenError, Picture, RenderError, Session, VerifyError, View, ViewOptions};
+pub use session::{
+    BACKGROUND, Focus, OpenError, Picture, PlaneView, Progressive, RenderError, Session, Step, VerifyError,
+    View, ViewOptions,
+};
+pub use technique::Technique;
 pub use transfer::{ColorMap, Preset};
 
 pub use glam;
-pub use volery_frame::{Backend, Device, DeviceKind, Image};
+pub use volery_frame::{Backend, Device, DeviceKind, Image, Sampling, Thickness};
 pub use volery_io as io;
 pub use volery_reference as reference;
 pub use volery_scene::{
-    Camera, ControlPoint, Projection, SampleType, Samples, TransferFunction, VoxelGrid, camera, grid,
+    Camera, ControlPoint, Plane, Projection, SampleType, Samples, TransferFunction, VoxelGrid, camera, grid,
 };
 
 #[cfg(doctest)]

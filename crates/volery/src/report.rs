@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct Report {
     /// What was drawn.
     pub input: Input,
-    /// How: `raycast`.
+    /// How: `raycast`, `plane`.
     pub technique: &'static str,
     /// By whom.
     pub backend: Backend,
@@ -24,7 +24,7 @@ pub struct Report {
     /// What the picture was asked to cost or to be allowed to miss.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dial: Option<Dial>,
-    /// How far the picture is from the truth, where it was asked for.
+    /// How far the picture is from the truth, where that is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<Error>,
 }
@@ -35,7 +35,7 @@ pub struct Input {
     /// The file; missing for a volume from memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
-    /// `volume`.
+    /// `volume`, or `image` for a single slice.
     pub kind: &'static str,
     /// Samples along x, y, z.
     pub dims: [usize; 3],
@@ -100,18 +100,39 @@ pub struct Work {
     pub bytes_resident: u64,
     /// Texels sent to the backend for these frames.
     pub bytes_uploaded: u64,
+    /// Polygons in which planes cut the nodes drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polygons: Option<usize>,
 }
 
-/// The dial that was turned.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// The dials that were turned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Dial {
     /// Largest difference of a value from the full resolution, as a fraction of the file's value range.
-    pub tolerance: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
+    /// Largest difference of a colour channel from the full resolution.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// Of a focus: how many of its diagonals away a node may be drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<f64>,
 }
 
 /// Distance from the truth, of colour channels in [0, 1].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Error {
+    /// No channel of any pixel differs by more from the picture of the full resolution; computed without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound_max: Option<f64>,
+    /// What was found by comparing pictures.
+    #[serde(flatten)]
+    pub measured: Option<Measured>,
+}
+
+/// Distance of a picture from the true one, of colour channels in [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Measured {
     /// Largest difference of any channel of any pixel.
     pub measured_max: f64,
     /// Root of the mean squared difference over all channels of all pixels.

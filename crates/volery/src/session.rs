@@ -1,66 +1,37 @@
 //! A volume, a backend and what is resident there, kept from picture to picture.
 //!
-//! Opening a session builds the pyramid once. After that a new camera, transfer function or tolerance costs
+//! Opening a session builds the pyramid once. After that a new camera, transfer function, plane or dial costs
 //! what it changes: bricks that are resident stay, and the transfer function is integrated again only when it
 //! is another one.
 
+mod error;
+mod progressive;
+mod reporting;
+mod view;
+
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use volery_frame::{
-    Backend, DeviceKind, DrawError, Frame, Image, IntegratedTransfer, UploadError, VolumeLayout,
+    Backend, Content, Cubes, Frame, Image, IntegratedTransfer, Planes, PointTransfer, Rays, Thickness,
+    VolumeLayout,
 };
-use volery_pyramid::{Kind, NodeSource, Pyramid};
-use volery_scene::{Camera, SampleType, TransferFunction, VoxelGrid, camera};
+use volery_pyramid::{CubeTree, Kind, Node, NodeSource, Pyramid};
+use volery_reference::{PlaneScene, Tracer, metrics};
+use volery_scene::{TransferFunction, VoxelGrid};
 
 use crate::fit;
 use crate::histogram::Histogram;
 use crate::report::{self, Report};
-use crate::technique::raycast::{self, BRICK_CELLS, Plan, Uploaded};
+use crate::technique::parts::Parts;
+use crate::technique::residency::{self, Uploaded};
+use crate::technique::{Technique, fans, plane, raycast};
 use crate::texels::Encoding;
-use crate::transfer::Preset;
+use crate::transfer::{self, Preset};
 
-/// What to see of a volume, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct View {
-    /// Pixels from left to right.
-    pub width: u32,
-    /// Pixels from top to bottom.
-    pub height: u32,
-    /// Where the picture is taken from.
-    pub camera: Camera,
-    /// Values to colour and extinction.
-    pub transfer: TransferFunction,
-    /// Linear RGB behind the volume.
-    pub background: [f64; 3],
-    /// Largest difference of a value from the full resolution, as a fraction of the volume's value range;
-    /// `None` is the full resolution.
-    pub tolerance: Option<f64>,
-}
-
-/// Linear RGB behind the volume where nobody says otherwise: nearly black, a little blue.
-pub const BACKGROUND: [f64; 3] = [0.03, 0.035, 0.05];
-
-/// What a user may say about a view; [`Session::view`] fills in the rest.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ViewOptions {
-    /// Pixels from left to right.
-    pub width: u32,
-    /// Pixels from top to bottom.
-    pub height: u32,
-    /// From where to look.
-    pub direction: fit::Direction,
-    /// Whether rays are parallel.
-    pub orthographic: bool,
-    /// Values to colour and extinction; [`Preset::Auto`] if missing.
-    pub transfer: Option<TransferFunction>,
-}
-
-impl Default for ViewOptions {
-    fn default() -> Self {
-        let direction = fit::Direction::default();
-        Self { width: 768, height: 768, direction, orthographic: false, transfer: None }
-    }
-}
+pub use error::{OpenError, RenderError, VerifyError};
+pub use progressive::{Progressive, Step};
+pub use view::{BACKGROUND, Focus, PlaneView, View, ViewOptions};
 
 /// A picture and its report.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,101 +42,50 @@ pub struct Picture {
     pub report: Report,
 }
 
-/// Why a volume cannot be drawn.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// Samples that are colours.
-    #[error("raycast: samples are {found}, expected one channel of numbers")]
-    Colors {
-        /// Type of the samples.
-        found: SampleType,
-    },
-    /// An axis along which there is nothing to integrate.
-    #[error("raycast: {} x {} x {} samples, expected at least 2 along each axis", .dims[0], .dims[1], .dims[2])]
-    Flat {
-        /// Samples along x, y, z.
-        dims: [usize; 3],
-    },
-    /// Every sample is NaN or infinite.
-    #[error("raycast: every sample is blank, expected some finite values")]
-    Blank,
-    /// Values so far apart that their difference is no number.
-    #[error("raycast: values from {:e} to {:e}, expected a range below 1.8e308", .range[0], .range[1])]
-    TooWide {
-        /// Smallest and largest value.
-        range: [f64; 2],
-    },
-    /// The pyramid cannot be built.
-    #[error("pyramid: {0}")]
-    Layout(#[from] volery_pyramid::layout::Error),
-    /// The backend cannot hold bricks of this volume.
-    #[error(transparent)]
-    Backend(#[from] UploadError),
-}
-
-/// Why a picture could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum RenderError {
-    /// The camera cannot take a picture.
-    #[error(transparent)]
-    Camera(#[from] camera::Defect),
-    /// A tolerance that is no fraction of the range.
-    #[error("tolerance is {found}, expected a number of at least 0")]
-    Tolerance {
-        /// As given.
-        found: f64,
-    },
-    /// A background that is no colour.
-    #[error("background is {found:?}, expected three numbers in [0, 1]")]
-    Background {
-        /// As given.
-        found: [f64; 3],
-    },
-    /// A picture without pixels.
-    #[error("picture of {width}x{height} pixels, expected at least 1x1")]
-    Empty {
-        /// Pixels from left to right.
-        width: u32,
-        /// Pixels from top to bottom.
-        height: u32,
-    },
-    /// No frame was asked for.
-    #[error("0 frames, expected at least 1")]
-    NoFrame,
-    /// Bricks could not be made resident.
-    #[error(transparent)]
-    Bricks(#[from] raycast::Error),
-    /// The backend could not draw.
-    #[error(transparent)]
-    Draw(#[from] DrawError),
-}
-
-/// Why a picture could not be compared with the truth.
-#[derive(Debug, thiserror::Error)]
-pub enum VerifyError {
-    /// The truth could not be computed.
-    #[error("reference: {0}")]
-    Reference(#[from] volery_reference::Error),
-    /// The picture has not as many pixels as it says.
-    #[error(transparent)]
-    Pixels(#[from] volery_reference::SizeMismatch),
-    /// The picture is of another size than the view.
-    #[error(transparent)]
-    Size(#[from] volery_reference::metrics::Error),
-}
-
-/// Draws one volume again and again.
+/// Draws one volume again and again, by one technique.
 pub struct Session {
+    technique: Technique,
     grid: VoxelGrid,
     source: Pyramid,
+    /// Of the technique fans.
+    cubes: Option<CubeTree>,
     backend: Box<dyn Backend>,
     volume: VolumeLayout,
     encoding: Encoding,
     transfer: Option<(TransferFunction, IntegratedTransfer)>,
+    /// Of the technique plane, once an error was asked for.
+    parts: OnceLock<Parts>,
     build_seconds: f64,
 }
 
-/// What one frame took.
+/// What one frame draws.
+enum Plan {
+    Rays(raycast::Plan),
+    Planes(plane::Plan),
+    Cubes(fans::Plan),
+}
+
+impl Plan {
+    /// How many nodes are drawn, or cubes, of each level.
+    fn nodes_by_level(&self) -> Vec<usize> {
+        match self {
+            Self::Rays(plan) => plan.cut.nodes_by_level(),
+            Self::Planes(plan) => plan.cut.nodes_by_level(),
+            Self::Cubes(plan) => plan.cubes_by_level.clone(),
+        }
+    }
+
+    /// Whose bricks it needs.
+    fn nodes(&self) -> &[Node] {
+        match self {
+            Self::Rays(plan) => &plan.nodes,
+            Self::Planes(plan) => &plan.cut.nodes,
+            Self::Cubes(_) => &[],
+        }
+    }
+}
+
+/// What one frame took, in seconds.
 struct Times {
     select: f64,
     upload: f64,
@@ -182,31 +102,42 @@ impl Session {
     /// Builds the pyramid of a volume and hands its shape to the backend.
     ///
     /// # Errors
-    /// When the volume has nothing to be drawn, or the backend cannot hold it.
-    pub fn open(grid: VoxelGrid, mut backend: Box<dyn Backend>) -> Result<Self, OpenError> {
+    /// When the volume has nothing to be drawn by this technique, or the backend cannot hold it.
+    pub fn open(
+        grid: VoxelGrid,
+        mut backend: Box<dyn Backend>,
+        technique: Technique,
+    ) -> Result<Self, OpenError> {
         let start = Instant::now();
         let (sample_type, dims) = (grid.sample_type(), grid.dims());
-        if sample_type.channels() != 1 {
-            return Err(OpenError::Colors { found: sample_type });
-        }
-        if dims.contains(&1) {
-            return Err(OpenError::Flat { dims });
-        }
-        let source = Pyramid::build(&grid, Kind::Decimated, BRICK_CELLS)?;
-        let stats = &source.stats(source.layout().root())[0];
-        if stats.is_blank() {
+        let brick_cells = match technique {
+            Technique::Plane => plane::BRICK_CELLS,
+            _ if sample_type.channels() != 1 => {
+                return Err(OpenError::Colors { technique: technique.name(), found: sample_type });
+            }
+            _ if dims.contains(&1) => return Err(OpenError::Flat { technique: technique.name(), dims }),
+            Technique::Fans if dims.iter().any(|&n| n > fans::MAX_DIM) => {
+                return Err(OpenError::TooLong { dims, max: fans::MAX_DIM });
+            }
+            Technique::Raycast | Technique::Fans => raycast::BRICK_CELLS,
+        };
+        let source = Pyramid::build(&grid, Kind::Decimated, brick_cells)?;
+        let channels = source.stats(source.layout().root());
+        if channels[0].is_blank() {
             return Err(OpenError::Blank);
         }
-        let range = [stats.min, stats.max];
+        let range = if channels.len() == 1 { [channels[0].min, channels[0].max] } else { [0.0, 255.0] };
         if !(range[1] - range[0]).is_finite() {
             return Err(OpenError::TooWide { range });
         }
-        let encoding = Encoding::new(sample_type, range).ok_or(OpenError::Colors { found: sample_type })?;
+        let encoding = Encoding::new(sample_type, range);
+        let cubes =
+            (technique == Technique::Fans).then(|| CubeTree::build(&grid, encoding.scale, encoding.offset));
         let volume = VolumeLayout {
             // A layout's axes are below 2^31 samples.
             cells: dims.map(|n| (n - 1) as u32),
             spacing: grid.spacing(),
-            brick_cells: BRICK_CELLS as u32,
+            brick_cells: brick_cells as u32,
             texel: encoding.texel,
             value_scale: encoding.scale,
             value_offset: encoding.offset,
@@ -214,7 +145,18 @@ impl Session {
         };
         backend.set_volume(&volume)?;
         let build_seconds = start.elapsed().as_secs_f64();
-        Ok(Self { grid, source, backend, volume, encoding, transfer: None, build_seconds })
+        Ok(Self {
+            technique,
+            grid,
+            source,
+            cubes,
+            backend,
+            volume,
+            encoding,
+            transfer: None,
+            parts: OnceLock::new(),
+            build_seconds,
+        })
     }
 
     /// The volume.
@@ -222,23 +164,51 @@ impl Session {
         &self.grid
     }
 
-    /// Smallest and largest finite value of the volume.
+    /// How it is drawn.
+    pub fn technique(&self) -> Technique {
+        self.technique
+    }
+
+    /// Smallest and largest finite value of the volume; of colours, 0 and 255.
     pub fn value_range(&self) -> [f64; 2] {
         self.volume.value_range
     }
 
-    /// A view of everything that is visible, in full resolution: the camera as near as it can be, the
-    /// transfer function from the histogram unless `options` have one.
+    /// A view of everything that is visible, in full resolution: the camera as near as it can be, planes and
+    /// transfer function as [`ViewOptions`] says where it has none.
     pub fn view(&self, options: &ViewOptions) -> View {
-        let ViewOptions { width, height, direction, orthographic, transfer } = options.clone();
-        let transfer = transfer.unwrap_or_else(|| self.preset(Preset::Auto));
-        let blocks = fit::visible_blocks(&self.source, &transfer);
+        let ViewOptions { width, height, direction, orthographic, transfer, mut planes } = options.clone();
         let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
-        let camera = fit::camera(&blocks, direction, orthographic, aspect);
-        View { width, height, camera, transfer, background: BACKGROUND, tolerance: None }
+        let (camera, transfer) = match self.technique {
+            Technique::Raycast | Technique::Fans => {
+                let transfer = transfer.unwrap_or_else(|| self.preset(Preset::Auto));
+                let blocks = fit::visible_blocks(&self.source, &transfer);
+                (fit::camera(&blocks, direction.unwrap_or_default(), orthographic, aspect), transfer)
+            }
+            Technique::Plane => {
+                if planes.planes.is_empty() {
+                    planes.planes = plane::middle_planes(&self.grid);
+                }
+                let transfer =
+                    transfer.unwrap_or_else(|| transfer::gray(self.value_range(), self.grid.extent()));
+                let camera =
+                    plane::camera(self.source.layout(), &planes.planes, direction, orthographic, aspect);
+                (camera, transfer)
+            }
+        };
+        View {
+            width,
+            height,
+            camera,
+            transfer,
+            background: BACKGROUND,
+            tolerance: None,
+            planes,
+            thickness: Thickness::default(),
+        }
     }
 
-    /// The transfer function of a preset for this volume.
+    /// The transfer function of a preset for this volume; of colours, for their first channel.
     ///
     /// # Panics
     /// Never: a session's volume has a histogram.
@@ -261,15 +231,20 @@ impl Session {
     /// # Errors
     /// As [`Session::render`], and when `num_frames` is 0.
     pub fn render_frames(&mut self, view: &View, num_frames: usize) -> Result<Picture, RenderError> {
-        check(view)?;
+        self.check(view)?;
         let mut times = Vec::with_capacity(num_frames);
         let mut uploaded = Uploaded::default();
         let mut last = None;
         for _ in 0..num_frames {
-            let (image, plan, moved, took) = self.draw_frame(view)?;
-            uploaded.bricks += moved.bricks;
-            uploaded.bytes += moved.bytes;
-            times.push(took);
+            let start = Instant::now();
+            let plan = self.plan(view);
+            let select = start.elapsed().as_secs_f64();
+            let start = Instant::now();
+            uploaded += self.upload(plan.nodes())?;
+            let upload = start.elapsed().as_secs_f64();
+            let start = Instant::now();
+            let image = self.draw(view, &plan)?;
+            times.push(Times { select, upload, draw: start.elapsed().as_secs_f64() });
             last = Some((image, plan));
         }
         let (image, plan) = last.ok_or(RenderError::NoFrame)?;
@@ -277,84 +252,79 @@ impl Session {
         Ok(Picture { image, report })
     }
 
-    fn draw_frame(&mut self, view: &View) -> Result<(Image, Plan, Uploaded, Times), RenderError> {
-        let start = Instant::now();
-        if self.transfer.as_ref().is_none_or(|(transfer, _)| *transfer != view.transfer) {
-            let range = self.volume.value_range;
-            let table = IntegratedTransfer::new(&view.transfer, range, self.volume.spacing.min_element());
-            self.transfer = Some((view.transfer.clone(), table));
-        }
+    fn check(&self, view: &View) -> Result<(), RenderError> {
+        view.check()?;
+        if self.technique == Technique::Plane { view.planes.check() } else { Ok(()) }
+    }
+
+    /// Chooses what to draw; integrates the transfer function where that is needed and it is another one.
+    fn plan(&mut self, view: &View) -> Plan {
         let [low, high] = self.volume.value_range;
-        let tolerance = view.tolerance.unwrap_or(0.0) * (high - low);
+        let tolerance = view.tolerance.map(|tolerance| tolerance * (high - low));
         let size = [view.width, view.height];
-        let plan = raycast::plan(&self.source, &view.camera, size, &view.transfer, tolerance);
-        let selected = Instant::now();
-        let uploaded =
-            raycast::upload(&self.source, &self.encoding, &self.volume, &plan, self.backend.as_mut())?;
-        let resident = Instant::now();
-        let (_, transfer) = self.transfer.as_ref().expect("set above");
+        match self.technique {
+            Technique::Raycast => {
+                if self.transfer.as_ref().is_none_or(|(transfer, _)| *transfer != view.transfer) {
+                    let unit_length = self.volume.spacing.min_element();
+                    let table = IntegratedTransfer::new(&view.transfer, [low, high], unit_length);
+                    self.transfer = Some((view.transfer.clone(), table));
+                }
+                let tolerance = tolerance.unwrap_or(0.0);
+                Plan::Rays(raycast::plan(&self.source, &view.camera, size, &view.transfer, tolerance))
+            }
+            Technique::Plane => Plan::Planes(plane::plan(&self.source, self.parts(view), view, tolerance)),
+            Technique::Fans => {
+                let tree = self.cubes.as_ref().expect("opening built it");
+                let value = [self.encoding.scale, self.encoding.offset];
+                let volume = (&self.grid, tree, self.source.layout());
+                Plan::Cubes(fans::plan(volume, value, view, tolerance.unwrap_or(0.0)))
+            }
+        }
+    }
+
+    /// What makes bounds tight, where an error is asked for.
+    fn parts(&self, view: &View) -> Option<&Parts> {
+        view.planes.max_error.map(|_| self.parts.get_or_init(|| Parts::new(&self.grid)))
+    }
+
+    fn upload(&mut self, nodes: &[Node]) -> Result<Uploaded, RenderError> {
+        let backend = self.backend.as_mut();
+        Ok(residency::upload(&self.source, &self.encoding, &self.volume, nodes, backend)?)
+    }
+
+    fn draw(&mut self, view: &View, plan: &Plan) -> Result<Image, RenderError> {
+        let point_transfer;
+        let content = match plan {
+            Plan::Rays(plan) => {
+                let (_, transfer) = self.transfer.as_ref().expect("planning integrated it");
+                Content::Rays(Rays { transfer, bricks: &plan.bricks })
+            }
+            Plan::Planes(plan) => {
+                point_transfer = PointTransfer::new(&view.transfer, &self.volume);
+                Content::Planes(Planes {
+                    planes: &view.planes.planes,
+                    bricks: &plan.bricks,
+                    transfer: &point_transfer,
+                    sampling: view.planes.sampling,
+                    is_transparent: view.planes.is_transparent,
+                    shows_bricks: view.planes.shows_nodes,
+                })
+            }
+            Plan::Cubes(plan) => Content::Cubes(Cubes { cubes: &plan.cubes, thickness: view.thickness }),
+        };
         let frame = Frame {
             width: view.width,
             height: view.height,
             camera: view.camera,
-            transfer,
             background: view.background.map(|c| c as f32),
-            bricks: &plan.bricks,
+            content,
         };
-        let image = self.backend.draw(&frame)?.image;
-        let times = Times {
-            select: (selected - start).as_secs_f64(),
-            upload: (resident - selected).as_secs_f64(),
-            draw: resident.elapsed().as_secs_f64(),
-        };
-        Ok((image, plan, uploaded, times))
-    }
-
-    fn report(&self, view: &View, plan: &Plan, uploaded: Uploaded, times: &[Times]) -> Report {
-        let device = self.backend.device();
-        let mut sorted: Vec<&Times> = times.iter().collect();
-        sorted.sort_by(|a, b| a.frame().total_cmp(&b.frame()));
-        let median = sorted[(sorted.len() - 1) / 2];
-        Report {
-            input: report::Input {
-                path: None,
-                kind: "volume",
-                dims: self.grid.dims(),
-                scalar: self.grid.sample_type().name(),
-            },
-            technique: "raycast",
-            backend: report::Backend {
-                kind: match device.kind {
-                    DeviceKind::Software => "software",
-                    DeviceKind::Gpu | DeviceKind::CpuDevice => "wgpu",
-                },
-                device: device.name,
-            },
-            image: report::ImageSize { width: view.width, height: view.height },
-            seconds: report::Seconds {
-                load: None,
-                build: self.build_seconds,
-                select: median.select,
-                upload: median.upload,
-                draw: median.draw,
-                frame: median.frame(),
-            },
-            frames: times.iter().map(|times| report::Frame { seconds: times.frame() }).collect(),
-            work: report::Work {
-                nodes: plan.nodes.len(),
-                nodes_by_level: plan.cut.nodes_by_level(),
-                bricks: uploaded.bricks,
-                bytes_resident: self.backend.resident_bytes(),
-                bytes_uploaded: uploaded.bytes,
-            },
-            dial: view.tolerance.map(|tolerance| report::Dial { tolerance }),
-            error: None,
-        }
+        Ok(self.backend.draw(&frame)?.image)
     }
 
     /// Compares a picture of this volume with the truth: the exact picture in `f64` of the full-resolution
     /// samples. Writes the error into the picture's report and returns the truth. `progress` hears a number
-    /// in [0, 1] now and then.
+    /// in [0, 1] now and then. Outlines of nodes are no part of the truth.
     ///
     /// # Errors
     /// When the truth cannot be computed, or the picture is of another size than the view.
@@ -364,12 +334,30 @@ impl Session {
         picture: &mut Picture,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<volery_reference::Image, VerifyError> {
-        let tracer = volery_reference::Tracer::new(&self.grid, &view.transfer)?;
-        let truth = tracer.render(&view.camera, view.background, view.width, view.height, progress)?;
+        let View { width, height, .. } = *view;
+        let truth = match self.technique {
+            Technique::Raycast | Technique::Fans => Tracer::new(&self.grid, &view.transfer)?.render(
+                &view.camera,
+                view.background,
+                width,
+                height,
+                progress,
+            )?,
+            Technique::Plane => {
+                let scene = PlaneScene {
+                    grid: &self.grid,
+                    planes: &view.planes.planes,
+                    transfer: &view.transfer,
+                    nearest: view.planes.sampling == volery_frame::Sampling::Nearest,
+                    is_transparent: view.planes.is_transparent,
+                };
+                scene.render(&view.camera, view.background, [width, height], progress)?
+            }
+        };
         let image = &picture.image;
         let drawn = volery_reference::Image::from_f32(image.width, image.height, &image.pixels)?;
-        let found = volery_reference::metrics::compare(&drawn, &truth)?;
-        picture.report.error = Some(report::Error {
+        let found = metrics::compare(&drawn, &truth)?;
+        picture.report.error.get_or_insert_default().measured = Some(report::Measured {
             measured_max: found.max,
             measured_rmse: found.rmse,
             measured_psnr_db: found.psnr_db.is_finite().then_some(found.psnr_db),
@@ -377,22 +365,4 @@ impl Session {
         });
         Ok(truth)
     }
-}
-
-fn check(view: &View) -> Result<(), RenderError> {
-    if let Some(defect) = view.camera.defects().into_iter().next() {
-        return Err(defect.into());
-    }
-    if let Some(found) = view.tolerance.filter(|tolerance| !(0.0..).contains(tolerance)) {
-        return Err(RenderError::Tolerance { found });
-    }
-    let found = view.background;
-    if !found.iter().all(|c| (0.0..=1.0).contains(c)) {
-        return Err(RenderError::Background { found });
-    }
-    let (width, height) = (view.width, view.height);
-    if width == 0 || height == 0 {
-        return Err(RenderError::Empty { width, height });
-    }
-    Ok(())
 }

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | u8, i8 | U8 | none |
 //! | u16, i16 | U16 | none |
+//! | RGB, RGBA | Rgba8, opaque where there is no fourth channel | none |
 //! | u32, i32, f32, f64 | F32, 0 at the smallest finite value and 1 at the largest | at most 2^-25 of the range |
 //!
 //! Relative to the range, since `f32` texels near 1e6 would leave nothing of a range of 1. A sample that is
@@ -22,10 +23,9 @@ pub(crate) struct Encoding {
 }
 
 impl Encoding {
-    /// For samples of a type whose finite values span `range`, `range[1] - range[0]` finite; `None` for
-    /// colours.
-    pub(crate) fn new(sample_type: SampleType, range: [f64; 2]) -> Option<Self> {
-        let integers = |texel, offset| Some(Self { texel, scale: 1.0, offset });
+    /// For samples of a type whose finite values span `range`, `range[1] - range[0]` finite.
+    pub(crate) fn new(sample_type: SampleType, range: [f64; 2]) -> Self {
+        let integers = |texel, offset| Self { texel, scale: 1.0, offset };
         match sample_type {
             SampleType::U8 => integers(TexelType::U8, 0.0),
             SampleType::I8 => integers(TexelType::U8, f64::from(i8::MIN)),
@@ -34,9 +34,18 @@ impl Encoding {
             SampleType::U32 | SampleType::I32 | SampleType::F32 | SampleType::F64 => {
                 let width = range[1] - range[0];
                 let scale = if width > 0.0 { width } else { 1.0 };
-                Some(Self { texel: TexelType::F32, scale, offset: range[0] })
+                Self { texel: TexelType::F32, scale, offset: range[0] }
             }
-            SampleType::Rgb8 | SampleType::Rgba8 => None,
+            SampleType::Rgb8 | SampleType::Rgba8 => integers(TexelType::Rgba8, 0.0),
+        }
+    }
+
+    /// From the smallest to the largest value that texels can stand for.
+    pub(crate) fn texel_span(&self) -> f64 {
+        match self.texel {
+            TexelType::U8 | TexelType::Rgba8 => self.scale * f64::from(u8::MAX),
+            TexelType::U16 => self.scale * f64::from(u16::MAX),
+            TexelType::F32 => self.scale,
         }
     }
 
@@ -50,6 +59,10 @@ impl Encoding {
             }
             BrickSamples::I16(values) => {
                 Texels::U16(refill(&mut buffer.words, values, |v| v.cast_unsigned() ^ 0x8000))
+            }
+            BrickSamples::Rgba8(colors) => Texels::Rgba8(colors),
+            BrickSamples::Rgb8(colors) => {
+                Texels::Rgba8(refill(&mut buffer.colors, colors, |[r, g, b]| [r, g, b, 255]))
             }
             other => for_brick_samples!(other, |values| {
                 Texels::F32(refill(&mut buffer.floats, values, |v| self.relative(v.channel(0))))
@@ -69,6 +82,7 @@ pub(crate) struct Buffer {
     bytes: Vec<u8>,
     words: Vec<u16>,
     floats: Vec<f32>,
+    colors: Vec<[u8; 4]>,
 }
 
 fn refill<'a, T: Copy, U>(buffer: &'a mut Vec<U>, values: &[T], texel: impl Fn(T) -> U) -> &'a [U] {
@@ -83,12 +97,13 @@ mod tests {
 
     /// The values that texels stand for.
     fn decoded(samples: &BrickSamples, range: [f64; 2]) -> Vec<f64> {
-        let encoding = Encoding::new(samples.sample_type(), range).unwrap();
+        let encoding = Encoding::new(samples.sample_type(), range);
         let mut buffer = Buffer::default();
         let texels: Vec<f64> = match encoding.encode(samples, &mut buffer) {
             Texels::U8(texels) => texels.iter().map(|&t| f64::from(t)).collect(),
             Texels::U16(texels) => texels.iter().map(|&t| f64::from(t)).collect(),
             Texels::F32(texels) => texels.iter().map(|&t| f64::from(t)).collect(),
+            Texels::Rgba8(_) => panic!("colours"),
         };
         texels.iter().map(|texel| encoding.offset + encoding.scale * texel).collect()
     }
@@ -126,10 +141,21 @@ mod tests {
     }
 
     #[test]
-    fn blanks_are_nan_and_colours_are_refused() {
+    fn blanks_are_nan() {
         let found =
             decoded(&BrickSamples::F32(vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 2.0]), [2.0, 2.0]);
         assert!(found[..3].iter().all(|value| value.is_nan()) && found[3] == 2.0, "{found:?}");
-        assert_eq!(Encoding::new(SampleType::Rgb8, [0.0, 255.0]), None);
+    }
+
+    #[test]
+    fn colours_are_kept_and_opaque_where_nothing_is_said() {
+        let mut buffer = Buffer::default();
+        let rgb = Encoding::new(SampleType::Rgb8, [0.0, 255.0]);
+        let samples = BrickSamples::Rgb8(vec![[1, 2, 3]]);
+        let Texels::Rgba8(found) = rgb.encode(&samples, &mut buffer) else { panic!("other texels") };
+        assert_eq!(found, [[1, 2, 3, 255]]);
+        let rgba = BrickSamples::Rgba8(vec![[1, 2, 3, 4]]);
+        let Texels::Rgba8(found) = rgb.encode(&rgba, &mut buffer) else { panic!("other texels") };
+        assert_eq!(found, [[1, 2, 3, 4]]);
     }
 }

@@ -9,7 +9,7 @@ use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::{
     Backend, BackendChoice, ControlPoint, Device, DeviceKind, Image, OpenError, Preset, RenderError,
-    SampleType, Session, TransferFunction, View, ViewOptions, VoxelGrid, open_backend,
+    SampleType, Session, Technique, TransferFunction, View, ViewOptions, VoxelGrid, open_backend,
 };
 use volery_frame::{Brick, BrickId, DrawError, Drawn, Frame, UploadError, VolumeLayout};
 
@@ -22,12 +22,12 @@ fn small() -> ViewOptions {
 }
 
 fn session_of(grid: VoxelGrid) -> Session {
-    Session::open(grid, software()).unwrap()
+    Session::open(grid, software(), Technique::Raycast).unwrap()
 }
 
 fn turned(session: &Session, azimuth_deg: f64) -> View {
     let direction = Direction { azimuth_deg, elevation_deg: 10.0, zoom: 1.0 };
-    session.view(&ViewOptions { direction, ..small() })
+    session.view(&ViewOptions { direction: Some(direction), ..small() })
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn blank_samples_are_verified_too() {
         let view = View { tolerance, ..view.clone() };
         let mut picture = session.render(&view).unwrap();
         session.verify(&view, &mut picture, &|_| {}).unwrap();
-        let error = picture.report.error.unwrap();
+        let error = picture.report.error.unwrap().measured.unwrap();
         println!("tolerance {tolerance:?}: rmse {:.5}, max {:.5}", error.measured_rmse, error.measured_max);
         assert!(error.measured_rmse < 0.01, "rmse {}", error.measured_rmse);
     }
@@ -124,10 +124,10 @@ fn blank_samples_are_verified_too() {
 
 #[test]
 fn what_cannot_be_drawn_is_refused() {
-    let open = |grid| Session::open(grid, software()).err().unwrap();
+    let open = |grid| Session::open(grid, software(), Technique::Raycast).err().unwrap();
     let colors = VoxelGrid::new([2, 2, 2], DVec3::ONE, vec![[0u8; 4]; 8]).unwrap();
-    assert!(matches!(open(colors), OpenError::Colors { found: SampleType::Rgba8 }));
-    assert!(matches!(open(volery_data::noise([4, 1, 4], 0)), OpenError::Flat { dims: [4, 1, 4] }));
+    assert!(matches!(open(colors), OpenError::Colors { found: SampleType::Rgba8, .. }));
+    assert!(matches!(open(volery_data::noise([4, 1, 4], 0)), OpenError::Flat { dims: [4, 1, 4], .. }));
     let blank = VoxelGrid::new([2, 2, 2], DVec3::ONE, vec![f64::NAN; 8]).unwrap();
     assert!(matches!(open(blank), OpenError::Blank));
     let mut session = session_of(volery_data::marschner_lobb(12));
@@ -189,7 +189,7 @@ impl Backend for Narrow {
 
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
         let bricks = self.bricks.lock().unwrap();
-        for brick in frame.bricks {
+        for brick in frame.content.bricks() {
             assert!(bricks.contains_key(&brick.id), "{brick:?} is not resident");
         }
         let pixels = vec![[0.0; 3]; (frame.width * frame.height) as usize];
@@ -201,7 +201,7 @@ impl Backend for Narrow {
 fn a_full_pool_forgets_what_the_frame_does_not_need() {
     let grid = volery_data::noise([65, 65, 65], 3);
     let backend = Narrow { room: 8, ..Narrow::default() };
-    let mut session = Session::open(grid, Box::new(backend.clone())).unwrap();
+    let mut session = Session::open(grid, Box::new(backend.clone()), Technique::Raycast).unwrap();
     let everything =
         TransferFunction::new(vec![ControlPoint { value: 0.0, color: [1.0; 3], opacity: 0.1 }], 1.0);
     let fine = session.view(&ViewOptions { transfer: Some(everything.unwrap()), ..small() });
@@ -211,7 +211,8 @@ fn a_full_pool_forgets_what_the_frame_does_not_need() {
     assert_eq!(session.render(&fine).unwrap().report.work.bricks, 8);
     // Room for fewer than one frame needs is an error that says so.
     let tight = Narrow { room: 7, ..Narrow::default() };
-    let mut session = Session::open(volery_data::noise([65, 65, 65], 3), Box::new(tight)).unwrap();
+    let mut session =
+        Session::open(volery_data::noise([65, 65, 65], 3), Box::new(tight), Technique::Raycast).unwrap();
     let error = session.render(&fine).unwrap_err().to_string();
     assert!(error.contains('8') && error.contains('7'), "{error}");
 }
@@ -220,12 +221,12 @@ fn a_full_pool_forgets_what_the_frame_does_not_need() {
 fn uploads_come_in_batches_of_bounded_size() {
     let backend = Narrow { room: usize::MAX, ..Narrow::default() };
     let grid = volery_data::ramp([200, 200, 130], DVec3::ONE, DVec3::ONE, 0.0);
-    let mut session = Session::open(grid, Box::new(backend.clone())).unwrap();
+    let mut session = Session::open(grid, Box::new(backend.clone()), Technique::Raycast).unwrap();
     let everything =
         TransferFunction::new(vec![ControlPoint { value: 0.0, color: [1.0; 3], opacity: 0.1 }], 1.0);
     let view = session.view(&ViewOptions { transfer: Some(everything.unwrap()), ..small() });
     let work = session.render(&view).unwrap().report.work;
     let largest = *backend.largest_upload.lock().unwrap();
-    assert!(largest <= volery::technique::raycast::BATCH_BYTES, "{largest}");
+    assert!(largest <= volery::technique::residency::BATCH_BYTES, "{largest}");
     assert!(work.bytes_uploaded > largest as u64, "more than one batch");
 }

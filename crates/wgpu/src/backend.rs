@@ -2,16 +2,18 @@
 
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Device, DeviceKind, DrawError, Drawn, Frame, Image, IntegratedTransfer,
-    PlacedBrick, UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, IntegratedTransfer,
+    PlacedBrick, Planes, Rays, UploadError, VolumeLayout,
 };
 use volery_shaders::raycast;
 
 use crate::adapter::{self, OpenError};
+use crate::cubes::CubeFans;
 use crate::gpu::{Failure, Gpu};
-use crate::picture::{Band, rows_per_band};
+use crate::picture::{Band, draw_in_bands};
+use crate::plane::Plane;
 use crate::pool::Pool;
-use crate::raycast::{Raycast, Resources, transfer_texture, units_texture};
+use crate::raycast::{Form, Raycast, Resources, transfer_texture, units_texture};
 use crate::units::{Matter, Units};
 use crate::view::shader_frame;
 
@@ -22,6 +24,8 @@ const MAX_SIZE: u32 = 16384;
 pub struct WgpuBackend {
     gpu: Gpu,
     raycast: Raycast,
+    plane: Plane,
+    cubes: CubeFans,
     pool: Option<Pool>,
     prepared: Option<Prepared>,
     band: Option<Band>,
@@ -35,7 +39,7 @@ struct Prepared {
     units: Units,
     units_texture: wgpu::Texture,
     transfer_texture: wgpu::Texture,
-    has_blanks: bool,
+    form: Form,
 }
 
 impl WgpuBackend {
@@ -60,24 +64,26 @@ impl WgpuBackend {
         let fail =
             |failure: Failure| OpenError::Device { name: gpu.info.name.clone(), reason: failure.to_string() };
         let raycast = Raycast::new(&gpu).map_err(fail)?;
-        Ok(Self { gpu, raycast, pool: None, prepared: None, band: None })
+        let plane = Plane::new(&gpu).map_err(fail)?;
+        let cubes = CubeFans::new(&gpu).map_err(fail)?;
+        Ok(Self { gpu, raycast, plane, cubes, pool: None, prepared: None, band: None })
     }
 
     /// Everything that depends on bricks and transfer function, made anew only where they changed.
-    fn prepare(&mut self, frame: &Frame<'_>) -> Result<(), Failure> {
+    fn prepare(&mut self, rays: &Rays<'_>) -> Result<(), Failure> {
         let Some(pool) = &self.pool else { return Ok(()) };
         let is_current = self.prepared.as_ref().is_some_and(|prepared| {
             prepared.generation == pool.generation()
-                && prepared.bricks == frame.bricks
-                && prepared.transfer == *frame.transfer
+                && prepared.bricks == rays.bricks
+                && prepared.transfer == *rays.transfer
         });
         if is_current {
             return Ok(());
         }
         let (layout, resident) = (pool.layout(), pool.resident());
         let units = Units::new(
-            &Matter { layout, resident, transfer: frame.transfer, slots_per_layer: pool.slots_per_layer() },
-            frame.bricks,
+            &Matter { layout, resident, transfer: rays.transfer, slots_per_layer: pool.slots_per_layer() },
+            rays.bricks,
         );
         let max = self.gpu.device.limits().max_texture_dimension_3d;
         if units.dims.iter().any(|&n| n > max) {
@@ -86,60 +92,46 @@ impl WgpuBackend {
                 "volume of {x} x {y} x {z} units, expected at most {max} per axis"
             )));
         }
+        let has_blanks = rays.bricks.iter().any(|brick| resident[&brick.id].summary.has_blanks);
         let (units_texture, transfer_texture) = self
             .gpu
-            .checked(|| (units_texture(&self.gpu, &units), transfer_texture(&self.gpu, frame.transfer)))?;
+            .checked(|| (units_texture(&self.gpu, &units), transfer_texture(&self.gpu, rays.transfer)))?;
         self.prepared = Some(Prepared {
             generation: pool.generation(),
-            bricks: frame.bricks.to_vec(),
-            transfer: frame.transfer.clone(),
+            bricks: rays.bricks.to_vec(),
+            transfer: rays.transfer.clone(),
             units,
             units_texture,
             transfer_texture,
-            has_blanks: frame.bricks.iter().any(|brick| resident[&brick.id].summary.has_blanks),
+            form: Form::new(rays, layout, has_blanks),
         });
         Ok(())
     }
 
-    fn cast_rays(&mut self, frame: &Frame<'_>) -> Result<Drawn, Failure> {
-        self.prepare(frame)?;
-        let (width, height) = (frame.width, frame.height);
-        let num_pixels = width as usize * height as usize;
-        let mut pixels = Vec::new();
-        let no_memory = |_| Failure::Other(format!("no memory for a picture of {width}x{height} pixels"));
-        pixels.try_reserve_exact(num_pixels).map_err(no_memory)?;
+    fn cast_rays(&mut self, frame: &Frame<'_>, rays: &Rays<'_>) -> Result<Drawn, Failure> {
+        self.prepare(rays)?;
         let (Some(pool), Some(prepared)) = (&self.pool, &self.prepared) else {
             return Ok(background(frame));
         };
         let Some(atlas) = pool.texture() else { return Ok(background(frame)) };
-        let rows = rows_per_band(&self.gpu, width, height, raycast::TILE);
         let gpu = &self.gpu;
-        let band = match self.band.take().filter(|band| band.fits(width, rows)) {
-            Some(band) => band,
-            None => gpu.checked(|| Band::new(gpu, width, rows))?,
-        };
-        let resources = Resources {
-            units: &prepared.units_texture,
-            atlas,
-            transfer: &prepared.transfer_texture,
-            picture: &band.pixels,
-        };
-        let bound = gpu.checked(|| self.raycast.bind(gpu, &resources))?;
-        let pipeline = self.raycast.pipeline(gpu, prepared.has_blanks)?;
-        let mut shader_frame = shader_frame(frame, pool.layout(), &prepared.units, pool);
-        let mut seconds = Some(0.0);
-        for first_row in (0..height).step_by(rows as usize) {
-            let end_row = (first_row + rows).min(height);
-            (shader_frame.first_row, shader_frame.end_row) = (first_row, end_row);
-            let num_pixels = width as usize * (end_row - first_row) as usize;
-            self.raycast.set_frame(gpu, &shader_frame);
-            let band_seconds = band.run(gpu, num_pixels, &mut pixels, |pass| {
-                Raycast::encode(pass, &pipeline, &bound, &shader_frame);
-            })?;
-            seconds = seconds.zip(band_seconds).map(|(sum, band)| sum + band);
-        }
-        self.band = Some(band);
-        Ok(Drawn { image: Image { width, height, pixels }, device_seconds: seconds })
+        let pipeline = self.raycast.pipeline(gpu, prepared.form)?;
+        let mut shader_frame = shader_frame(frame, rays.transfer, pool.layout(), &prepared.units, pool);
+        let (units, transfer) = (&prepared.units_texture, &prepared.transfer_texture);
+        let raycast = &self.raycast;
+        let bind =
+            |picture: &wgpu::Buffer, _| raycast.bind(gpu, &Resources { units, atlas, transfer, picture });
+        let size = [frame.width, frame.height];
+        draw_in_bands(gpu, &mut self.band, size, raycast::TILE, bind, |pass, bound, rows| {
+            (shader_frame.first_row, shader_frame.end_row) = (rows.start, rows.end);
+            raycast.set_frame(gpu, &shader_frame);
+            Raycast::encode(pass, &pipeline, bound, &shader_frame);
+        })
+    }
+
+    fn draw_planes(&mut self, frame: &Frame<'_>, planes: &Planes<'_>) -> Result<Drawn, Failure> {
+        let Some(pool) = &self.pool else { return Ok(background(frame)) };
+        self.plane.draw(&self.gpu, pool, &mut self.band, frame, planes)
     }
 }
 
@@ -151,6 +143,7 @@ impl Backend for WgpuBackend {
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
         let pool = Pool::new(&self.gpu, layout)?;
         self.prepared = None;
+        self.plane.forget();
         self.pool = Some(pool);
         Ok(())
     }
@@ -174,13 +167,19 @@ impl Backend for WgpuBackend {
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
         let pool = self.pool.as_ref().ok_or(DrawError::NoVolume)?;
         check_frame(frame, pool.layout(), MAX_SIZE)?;
-        if let Some(brick) = frame.bricks.iter().find(|brick| !pool.resident().contains_key(&brick.id)) {
+        if let Some(brick) = frame.content.bricks().find(|brick| !pool.resident().contains_key(&brick.id)) {
             return Err(DrawError::NotResident { id: brick.id });
         }
-        if frame.bricks.is_empty() || pool.layout().cells.contains(&0) {
-            return Ok(background(frame));
-        }
-        self.cast_rays(frame).map_err(|failure| DrawError::Device(failure.to_string()))
+        let has_bricks = frame.content.bricks().next().is_some();
+        let drawn = match &frame.content {
+            Content::Rays(_) if !has_bricks || pool.layout().cells.contains(&0) => Ok(background(frame)),
+            Content::Rays(rays) => self.cast_rays(frame, rays),
+            Content::Cubes(cubes) if cubes.cubes.is_empty() => Ok(background(frame)),
+            Content::Cubes(cubes) => self.cubes.draw(&self.gpu, pool.layout(), &mut self.band, frame, cubes),
+            Content::Planes(planes) if !has_bricks || planes.planes.is_empty() => Ok(background(frame)),
+            Content::Planes(planes) => self.draw_planes(frame, planes),
+        };
+        drawn.map_err(|failure| DrawError::Device(failure.to_string()))
     }
 }
 

@@ -30,6 +30,8 @@ impl Summary {
         let (ranges, has_blanks) = match brick.texels {
             Texels::U8(texels) => (ranges(brick.samples, texels, block, f32::from), false),
             Texels::U16(texels) => (ranges(brick.samples, texels, block, f32::from), false),
+            // No ray is cast through colours.
+            Texels::Rgba8(_) => (Vec::new(), false),
             Texels::F32(texels) => {
                 let has_blanks = texels.iter().any(|texel| !texel.is_finite());
                 (ranges(brick.samples, texels, block, |texel| texel), has_blanks)

@@ -32,7 +32,9 @@ impl std::fmt::Display for Failure {
 
 impl Gpu {
     pub(crate) fn open(adapter: &wgpu::Adapter, info: Device) -> Result<Self, String> {
-        let useful = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM;
+        let useful = wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM
+            | wgpu::Features::FLOAT32_BLENDABLE;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("volery"),
             required_features: adapter.features() & useful,

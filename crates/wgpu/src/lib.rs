@@ -16,6 +16,9 @@
 //! loses nothing. Light accumulates in 32 bits as differences of transmittance, which add up exactly. A ray
 //! stops once it lets 1/4096 of the light through.
 //!
+//! Cutting planes share the pool. A workgroup draws a tile of 16x16 pixels, for which the CPU has found in f64 where
+//! each plane lies; a grid of runs of bricks in Z order, or a short search in a run, tells the brick of a place.
+//!
 //! # Guarantees
 //! No panic: what a device refuses comes back as an error. The same frame gives the same bits on the same
 //! device.
@@ -29,9 +32,13 @@
 
 mod adapter;
 mod backend;
+mod bindings;
 mod blocks;
+mod cubes;
+mod fan_view;
 mod gpu;
 mod picture;
+mod plane;
 mod pool;
 mod raycast;
 mod units;

@@ -1,7 +1,10 @@
 //! The picture on its way back: drawn in bands of rows, so that neither the size of a buffer nor the patience
 //! of a driver limits it, and read as f32.
 
+use std::ops::Range;
 use std::sync::mpsc;
+
+use volery_frame::{Drawn, Image};
 
 use crate::gpu::{Failure, Gpu};
 
@@ -16,7 +19,7 @@ const STAMP_BYTES: u64 = 16;
 
 /// Buffers for one band, and the clock.
 pub(crate) struct Band {
-    pub(crate) pixels: wgpu::Buffer,
+    pixels: wgpu::Buffer,
     staging: wgpu::Buffer,
     stamps: Option<Stamps>,
     bytes: u64,
@@ -28,7 +31,7 @@ struct Stamps {
 }
 
 /// Rows of a band in pictures of this width: multiples of a tile.
-pub(crate) fn rows_per_band(gpu: &Gpu, width: u32, height: u32, tile: u32) -> u32 {
+fn rows_per_band(gpu: &Gpu, width: u32, height: u32, tile: u32) -> u32 {
     let limits = gpu.device.limits();
     let bytes = BAND_BYTES.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
     let rows = bytes / (u64::from(width) * PIXEL_BYTES);
@@ -36,8 +39,83 @@ pub(crate) fn rows_per_band(gpu: &Gpu, width: u32, height: u32, tile: u32) -> u3
     (rows / tile).max(1) * tile
 }
 
+/// Where the passes of a band write their times, if the device has a clock.
+#[derive(Clone, Copy)]
+pub(crate) struct Clock<'a>(Option<&'a wgpu::QuerySet>);
+
+impl<'a> Clock<'a> {
+    /// For the first pass of several.
+    pub(crate) fn at_start(self) -> Option<wgpu::RenderPassTimestampWrites<'a>> {
+        self.0.map(|query_set| wgpu::RenderPassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: None,
+        })
+    }
+
+    /// For the last pass of several.
+    pub(crate) fn at_end(self) -> Option<wgpu::ComputePassTimestampWrites<'a>> {
+        self.0.map(|query_set| wgpu::ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: None,
+            end_of_pass_write_index: Some(1),
+        })
+    }
+}
+
+/// Draws a picture band by band in one compute pass each: for a range of rows, `bind` gets the buffer to fill,
+/// `encode` adds the commands. Buffers are taken from `kept` where they fit, and left there.
+pub(crate) fn draw_in_bands(
+    gpu: &Gpu,
+    kept: &mut Option<Band>,
+    size: [u32; 2],
+    tile: u32,
+    bind: impl FnMut(&wgpu::Buffer, Range<u32>) -> wgpu::BindGroup,
+    mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, &wgpu::BindGroup, Range<u32>),
+) -> Result<Drawn, Failure> {
+    draw_bands_in_passes(gpu, kept, size, tile, bind, |encoder, clock, bound, rows| {
+        let timestamp_writes = clock.at_end().map(|writes| wgpu::ComputePassTimestampWrites {
+            beginning_of_pass_write_index: Some(0),
+            ..writes
+        });
+        let descriptor = wgpu::ComputePassDescriptor { label: Some("volery picture"), timestamp_writes };
+        encode(&mut encoder.begin_compute_pass(&descriptor), bound, rows);
+    })
+}
+
+/// As [`draw_in_bands`] in passes of any kind and number; the first and the last one must look at the clock.
+pub(crate) fn draw_bands_in_passes<B>(
+    gpu: &Gpu,
+    kept: &mut Option<Band>,
+    [width, height]: [u32; 2],
+    tile: u32,
+    mut bind: impl FnMut(&wgpu::Buffer, Range<u32>) -> B,
+    mut encode: impl FnMut(&mut wgpu::CommandEncoder, Clock<'_>, &B, Range<u32>),
+) -> Result<Drawn, Failure> {
+    let mut pixels = Vec::new();
+    let no_memory = |_| Failure::Other(format!("no memory for a picture of {width}x{height} pixels"));
+    pixels.try_reserve_exact(width as usize * height as usize).map_err(no_memory)?;
+    let rows = rows_per_band(gpu, width, height, tile);
+    let band = match kept.take().filter(|band| band.fits(width, rows)) {
+        Some(band) => band,
+        None => gpu.checked(|| Band::new(gpu, width, rows))?,
+    };
+    let mut seconds = Some(0.0);
+    for first_row in (0..height).step_by(rows as usize) {
+        let end_row = (first_row + rows).min(height);
+        let rows = first_row..end_row;
+        let bound = gpu.checked(|| bind(&band.pixels, rows.clone()))?;
+        let num_pixels = width as usize * rows.len();
+        let run =
+            band.run(gpu, num_pixels, &mut pixels, |encoder, clock| encode(encoder, clock, &bound, rows))?;
+        seconds = seconds.zip(run).map(|(sum, run)| sum + run);
+    }
+    *kept = Some(band);
+    Ok(Drawn { image: Image { width, height, pixels }, device_seconds: seconds })
+}
+
 impl Band {
-    pub(crate) fn new(gpu: &Gpu, width: u32, rows: u32) -> Self {
+    fn new(gpu: &Gpu, width: u32, rows: u32) -> Self {
         let bytes = u64::from(width) * u64::from(rows) * PIXEL_BYTES;
         let buffer = |label, size, usage| {
             let descriptor =
@@ -74,18 +152,18 @@ impl Band {
     }
 
     /// Whether pictures of this width can be drawn in bands of these rows.
-    pub(crate) fn fits(&self, width: u32, rows: u32) -> bool {
+    fn fits(&self, width: u32, rows: u32) -> bool {
         self.bytes == u64::from(width) * u64::from(rows) * PIXEL_BYTES
     }
 
-    /// Runs a compute pass that fills [`Band::pixels`], appends the pixels of `num_pixels` to `picture`, and
+    /// Runs passes that fill [`Band::pixels`], appends the pixels of `num_pixels` to `picture`, and
     /// returns the device's own seconds.
-    pub(crate) fn run(
+    fn run(
         &self,
         gpu: &Gpu,
         num_pixels: usize,
         picture: &mut Vec<[f32; 3]>,
-        encode: impl FnOnce(&mut wgpu::ComputePass<'_>),
+        encode: impl FnOnce(&mut wgpu::CommandEncoder, Clock<'_>),
     ) -> Result<Option<f64>, Failure> {
         let received = gpu.checked(|| {
             self.submit(gpu, encode);
@@ -109,18 +187,10 @@ impl Band {
         Ok(seconds)
     }
 
-    fn submit(&self, gpu: &Gpu, encode: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
-        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("volery raycast") };
+    fn submit(&self, gpu: &Gpu, encode: impl FnOnce(&mut wgpu::CommandEncoder, Clock<'_>)) {
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("volery picture") };
         let mut encoder = gpu.device.create_command_encoder(&descriptor);
-        let timestamp_writes = self.stamps.as_ref().map(|stamps| wgpu::ComputePassTimestampWrites {
-            query_set: &stamps.queries,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        });
-        let descriptor = wgpu::ComputePassDescriptor { label: Some("volery raycast"), timestamp_writes };
-        let mut pass = encoder.begin_compute_pass(&descriptor);
-        encode(&mut pass);
-        drop(pass);
+        encode(&mut encoder, Clock(self.stamps.as_ref().map(|stamps| &stamps.queries)));
         encoder.copy_buffer_to_buffer(&self.pixels, 0, &self.staging, 0, self.bytes);
         if let Some(stamps) = &self.stamps {
             encoder.resolve_query_set(&stamps.queries, 0..2, &stamps.resolved, 0);

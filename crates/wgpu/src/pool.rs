@@ -86,6 +86,7 @@ impl Pool {
             TexelType::U8 => wgpu::TextureFormat::R8Unorm,
             TexelType::U16 if has_16_bits => wgpu::TextureFormat::R16Unorm,
             TexelType::U16 | TexelType::F32 => wgpu::TextureFormat::R32Float,
+            TexelType::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
         };
         let resident = HashMap::new();
         Ok(Self { layout: *layout, format, slot, atlas: None, resident, num_slots_used: 0, generation: 0 })
@@ -261,6 +262,7 @@ impl Pool {
             }
             Texels::U16(texels) => self.slot.fold(samples, texels, f32::from),
             Texels::F32(texels) => self.slot.fold(samples, texels, storable),
+            Texels::Rgba8(texels) => self.slot.fold(samples, texels, |texel| texel),
         };
         let [width, height] = self.slot.size;
         gpu.queue.write_texture(

@@ -1,21 +1,44 @@
 //! The pipeline that casts rays: its layouts from the shader's reflection, its textures, its commands.
 
-use std::num::NonZeroU64;
+use std::collections::HashMap;
 
-use volery_frame::IntegratedTransfer;
-use volery_shaders::{Binding, BindingKind, Dimension, TexelKind, raycast};
+use volery_frame::{IntegratedTransfer, Rays, VolumeLayout};
+use volery_shaders::{Binding, raycast};
 
+use crate::bindings::bind_group_layout;
 use crate::gpu::{Failure, Gpu};
 use crate::units::Units;
 
-/// The pipeline in its two forms: without blank texels and with them.
+/// The pipeline in its forms.
 pub(crate) struct Raycast {
     layout: wgpu::BindGroupLayout,
     module: wgpu::ShaderModule,
-    /// Without and with blanks; compiled when first needed.
-    pipelines: [Option<wgpu::ComputePipeline>; 2],
+    /// Compiled when first needed.
+    pipelines: HashMap<Form, wgpu::ComputePipeline>,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
+}
+
+/// What a frame asks of the pipeline: a form does not pay for what it need not do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Form {
+    /// Texels may be blank.
+    pub(crate) has_blanks: bool,
+    /// The transfer function's antiderivatives start anew somewhere.
+    pub(crate) has_restarts: bool,
+    /// A cell may hold more optical depth than one pair of pieces takes.
+    pub(crate) is_dense: bool,
+}
+
+impl Form {
+    pub(crate) fn new(rays: &Rays<'_>, layout: &VolumeLayout, has_blanks: bool) -> Self {
+        let level = rays.bricks.iter().map(|brick| brick.level).max().unwrap_or(0);
+        Self {
+            has_blanks,
+            has_restarts: !rays.transfer.restarts().is_empty(),
+            is_dense: rays.transfer.is_dense(layout, level),
+        }
+    }
 }
 
 /// What one frame binds.
@@ -30,17 +53,13 @@ impl Raycast {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Failure> {
         gpu.checked(|| {
             let device = &gpu.device;
-            let entries: Vec<_> = raycast::BINDINGS.iter().map(layout_entry).collect();
-            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("volery raycast"),
-                entries: &entries,
-            });
+            let layout = bind_group_layout(device, "volery raycast", raycast::BINDINGS);
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(raycast::LABEL),
                 source: wgpu::ShaderSource::Wgsl(raycast::SOURCE.into()),
             });
             Self {
-                pipelines: [None, None],
+                pipelines: HashMap::new(),
                 frame: device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("volery frame"),
                     size: size_of::<raycast::Frame>() as u64,
@@ -91,13 +110,12 @@ impl Raycast {
     }
 
     /// The pipeline of one form, compiled if this is the first frame that needs it.
-    pub(crate) fn pipeline(&mut self, gpu: &Gpu, has_blanks: bool) -> Result<wgpu::ComputePipeline, Failure> {
-        let made = &mut self.pipelines[usize::from(has_blanks)];
-        if let Some(pipeline) = made {
+    pub(crate) fn pipeline(&mut self, gpu: &Gpu, form: Form) -> Result<wgpu::ComputePipeline, Failure> {
+        if let Some(pipeline) = self.pipelines.get(&form) {
             return Ok(pipeline.clone());
         }
-        let pipeline = gpu.checked(|| pipeline(&gpu.device, &self.layout, &self.module, has_blanks))?;
-        Ok(made.insert(pipeline).clone())
+        let pipeline = gpu.checked(|| pipeline(&gpu.device, &self.layout, &self.module, form))?;
+        Ok(self.pipelines.entry(form).or_insert(pipeline).clone())
     }
 
     /// Casts the rays of `frame`'s band of rows.
@@ -118,7 +136,7 @@ fn pipeline(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     module: &wgpu::ShaderModule,
-    has_blanks: bool,
+    form: Form,
 ) -> wgpu::ComputePipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("volery raycast"),
@@ -126,47 +144,20 @@ fn pipeline(
         immediate_size: 0,
     });
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(if has_blanks { "volery raycast, blanks" } else { "volery raycast" }),
+        label: Some(&format!("volery raycast {form:?}")),
         layout: Some(&layout),
         module,
         entry_point: Some(raycast::MAIN),
         compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &[(raycast::HAS_BLANKS, f64::from(has_blanks))],
+            constants: &[
+                (raycast::HAS_BLANKS, f64::from(form.has_blanks)),
+                (raycast::HAS_RESTARTS, f64::from(form.has_restarts)),
+                (raycast::IS_DENSE, f64::from(form.is_dense)),
+            ],
             ..Default::default()
         },
         cache: None,
     })
-}
-
-fn layout_entry(binding: &Binding) -> wgpu::BindGroupLayoutEntry {
-    let buffer = |ty, bytes: u32| wgpu::BindingType::Buffer {
-        ty,
-        has_dynamic_offset: false,
-        min_binding_size: NonZeroU64::new(bytes.into()),
-    };
-    let ty = match binding.kind {
-        BindingKind::Uniform { bytes } => buffer(wgpu::BufferBindingType::Uniform, bytes),
-        BindingKind::Storage { read_only } => buffer(wgpu::BufferBindingType::Storage { read_only }, 0),
-        BindingKind::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering),
-        BindingKind::Texture { dimension, texel } => wgpu::BindingType::Texture {
-            sample_type: match texel {
-                TexelKind::Float => wgpu::TextureSampleType::Float { filterable: false },
-                TexelKind::Uint => wgpu::TextureSampleType::Uint,
-            },
-            view_dimension: match dimension {
-                Dimension::D2 => wgpu::TextureViewDimension::D2,
-                Dimension::D2Array => wgpu::TextureViewDimension::D2Array,
-                Dimension::D3 => wgpu::TextureViewDimension::D3,
-            },
-            multisampled: false,
-        },
-    };
-    wgpu::BindGroupLayoutEntry {
-        binding: binding.binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty,
-        count: None,
-    }
 }
 
 /// The units as a texture.

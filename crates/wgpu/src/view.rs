@@ -1,7 +1,8 @@
 //! From a frame to the numbers that the shader reads: in f64 up to the last step.
 
 use glam::DVec3;
-use volery_frame::{Frame, VolumeLayout};
+use volery_frame::integral::{MAX_RESTARTS, Restart};
+use volery_frame::{Frame, IntegratedTransfer, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 use volery_shaders::raycast;
 
@@ -28,9 +29,19 @@ fn rays_near_volume(frame: &Frame<'_>, layout: &VolumeLayout) -> RayGrid {
     }
 }
 
+/// Something of each restart; zero where there is none.
+fn restarts<T: bytemuck::Zeroable + Copy, const N: usize>(
+    transfer: &IntegratedTransfer,
+    of: impl Fn(&Restart) -> T,
+) -> [T; N] {
+    const { assert!(N == MAX_RESTARTS) };
+    std::array::from_fn(|i| transfer.restarts().get(i).map_or(T::zeroed(), &of))
+}
+
 /// The shader's frame; the band of rows is still open.
 pub(crate) fn shader_frame(
     frame: &Frame<'_>,
+    transfer: &IntegratedTransfer,
     layout: &VolumeLayout,
     units: &Units,
     pool: &Pool,
@@ -41,9 +52,9 @@ pub(crate) fn shader_frame(
     let longest = rays.toward.length().max(f64::MIN_POSITIVE);
     let spacing = layout.spacing.max_element();
     let direction = |v: DVec3| (v / longest * (spacing / layout.spacing)).as_vec3().to_array();
-    let depth = layout.spacing / frame.transfer.unit_length() * std::f64::consts::LOG2_E;
+    let depth = layout.spacing / transfer.unit_length() * std::f64::consts::LOG2_E;
     let texels_per_unit = pool.texels_per_unit();
-    let [scale, offset] = frame.transfer.bin_from_value();
+    let [scale, offset] = transfer.bin_from_value();
     // bin = scale * (value_scale * texel + value_offset) + offset, and its zero first, which f32 subtracts
     // without loss.
     let bins_per_texel = scale * layout.value_scale;
@@ -68,10 +79,13 @@ pub(crate) fn shader_frame(
         background: frame.background,
         bins_per_texel: (bins_per_texel * texels_per_unit) as f32,
         atlas_scale: pool.texture_size().map(|n| 1.0 / n as f32),
-        num_bins: frame.transfer.num_bins() as f32,
+        num_bins: transfer.num_bins() as f32,
         slices_per_row: pool.slot().slices_per_row as f32,
         rows_per_slice: 1.0 / pool.slot().slices_per_row as f32,
         slot_height: pool.slot().size[1] as f32,
+        num_restarts: transfer.restarts().len() as u32,
+        restart_bins: restarts(transfer, |restart| [restart.bin as i32, 0, 0, 0]),
+        restart_sums: restarts(transfer, |restart| restart.sums),
         ..bytemuck::Zeroable::zeroed()
     }
 }

@@ -2,7 +2,8 @@
 //
 // *Units* cover the volume evenly and say which brick is there, or how far around space is empty: a ray leaps
 // over such space. Elsewhere it visits the cells between samples: along a ray the trilinear field of a cell has no
-// kinks, and two pieces of each cell are integrated through the transfer function's antiderivative.
+// kinks, and pairs of straight pieces are integrated through the transfer function's antiderivative: one pair where
+// the field bends little, else more.
 //
 // Positions are in finest cells from the volume's lower corner, `t` is the way along the ray in finest cells, from
 // a start that the CPU chose near the volume, so that 32 bits do.
@@ -40,10 +41,20 @@ struct Frame {
     slices_per_row: f32,
     rows_per_slice: f32,
     slot_height: f32,
+    num_restarts: u32,
+    // Of each restart of the antiderivatives: in x the first bin that counts from it, and what it leaves out.
+    restart_bins: array<vec4i, MAX_RESTARTS>,
+    restart_sums: array<vec4f, MAX_RESTARTS>,
 }
 
 // Whether texels may be blank.
 override HAS_BLANKS: bool = false;
+// Whether the antiderivatives start anew somewhere.
+override HAS_RESTARTS: bool = false;
+// Whether cells may be so dense that a pair of pieces is too few for them.
+override IS_DENSE: bool = false;
+
+const MAX_RESTARTS: u32 = 8;
 
 // Texels from here on are blank.
 const BLANK: f32 = 1e38;
@@ -51,6 +62,17 @@ const BLANK: f32 = 1e38;
 const OPAQUE_DEPTH: f32 = 12.0;
 // Changes of the transfer function's antiderivative below this are none: their inverse might not be finite.
 const INVISIBLE: f32 = 1e-30;
+// A stretch along which twice the middle differs from the sum of the ends by more than this share of the value
+// range is halved.
+const MAX_BEND: f32 = 0.05;
+// A pair of pieces with more optical depth to the base 2 is shortened: colour and extinction may run far from
+// straight within what is seen of it. Not so where it passes few bins, since its ends are rounded to bins, nor
+// where it is so short, in finest cells, that `t` could stand still.
+const MAX_PAIR_DEPTH: f32 = 2.0;
+const MIN_PAIR_BINS: f32 = 64.0;
+const MIN_REACH: f32 = 0.004;
+// Longer than any ray.
+const FAR: f32 = 1e30;
 // Pixels per edge of a workgroup's tile.
 const TILE: u32 = 8;
 // In a unit's first word: set where it holds matter; then come the level, and the layer and row of the brick's
@@ -92,10 +114,19 @@ struct Light {
     transmittance: f32,
 }
 
-// One end of a piece of ray: its bin, and the antiderivatives there.
+// One end of a piece of ray: the value in bins, and the antiderivatives at its bin.
 struct End {
-    bin: i32,
+    value: f32,
     sums: vec4f,
+}
+
+// A piece of ray along which the value is taken as linear.
+struct Piece {
+    // Mean, weighted by extinction.
+    color: vec3f,
+    // Optical depth to the base 2.
+    depth: f32,
+    end: End,
 }
 
 // The corners of a cell below and above in z, as textureGather orders them.
@@ -136,37 +167,80 @@ fn corners_of_cell(slot: vec2u, cell: vec3f) -> Corners {
     return Corners(low, high - low);
 }
 
-fn bin_at(corners: Corners, w: vec3f) -> i32 {
+// The value in bins.
+fn value_at(corners: Corners, w: vec3f) -> f32 {
     let face = corners.low + w.z * corners.rise;
     // Gathered in the order (0, 1), (1, 1), (1, 0), (0, 0) of (x, y).
     let front = face.w + w.x * (face.z - face.w);
     let back = face.x + w.x * (face.y - face.x);
     let texel = front + w.y * (back - front);
-    let bin = (texel - frame.texel_of_bin_zero) * frame.bins_per_texel;
-    return i32(clamp(bin, 0.0, frame.num_bins) + 0.5);
+    return clamp((texel - frame.texel_of_bin_zero) * frame.bins_per_texel, 0.0, frame.num_bins);
 }
 
-fn end_of(bin: i32) -> End {
-    return End(bin, textureLoad(transfer, vec2i(bin, 0), 0));
+fn bin_of(value: f32) -> i32 {
+    return i32(value + 0.5);
 }
 
-// Adds the light of a piece of ray and returns its far end.
-fn integrate(light: ptr<function, Light>, from_end: End, bin: i32, depth_scale: f32) -> End {
-    let is_flat = bin == from_end.bin;
+// The value for the middle of a stretch, so that each of the straight lines to it from the ends has the mean of
+// the field over its half: a parabola bulges from its chord by a third of what the middle must give. Only where
+// the field runs one way, and never past the ends.
+fn balanced(first: f32, middle: f32, last: f32) -> f32 {
+    let low = min(first, last);
+    let high = max(first, last);
+    let moved = (8.0 * middle - first - last) * (1.0 / 6.0);
+    return select(middle, clamp(moved, low, high), middle >= low && middle <= high);
+}
+
+// What sums grow by from bin to bin, across restarts.
+fn change_of_sums(from_sums: vec4f, from_bin: i32, to_sums: vec4f, to_bin: i32) -> vec4f {
+    var from_here = from_sums;
+    var to_here = to_sums;
+    if HAS_RESTARTS {
+        for (var i = 0u; i < frame.num_restarts; i++) {
+            let bin = frame.restart_bins[i].x;
+            let sums = frame.restart_sums[i];
+            from_here -= select(vec4f(0.0), sums, from_bin < bin && bin <= to_bin);
+            to_here -= select(vec4f(0.0), sums, to_bin < bin && bin <= from_bin);
+        }
+    }
+    return to_here - from_here;
+}
+
+fn piece_to(from_end: End, value: f32, depth_scale: f32) -> Piece {
+    let from_bin = bin_of(from_end.value);
+    let bin = bin_of(value);
+    let is_flat = bin == from_bin;
     let to_bin = bin + select(0, 1, is_flat);
     let sums = textureLoad(transfer, vec2i(to_bin, 0), 0);
-    let change = sums - from_end.sums;
+    let change = change_of_sums(from_end.sums, from_bin, sums, to_bin);
     // One division for two: by the bins passed and by the change of depth.
-    let num_bins = f32(to_bin - from_end.bin);
+    let num_bins = f32(to_bin - from_bin);
     let inverse = 1.0 / (num_bins * select(change.w, 1.0, abs(change.w) < INVISIBLE));
-    let depth = (*light).depth + depth_scale * change.w * (change.w * inverse);
+    let depth = depth_scale * change.w * (change.w * inverse);
+    return Piece((num_bins * inverse) * change.rgb, depth, End(value, select(sums, from_end.sums, is_flat)));
+}
+
+// How far the light of a piece is from that of its mean colour, as a share of the change of colour along it:
+// `1/2 - 1/x + 1/(exp(x) - 1)` of the optical depth x.
+fn front_weight(depth: f32) -> f32 {
+    let x = min(depth * 0.6931472, 8.0);
+    return x / (0.2 * x * x + 12.0);
+}
+
+fn add_pair(light: ptr<function, Light>, a: Piece, b: Piece) {
+    // Where one piece is much thinner than the other, its colour tells little of the other's.
+    let slope = (min(a.depth, b.depth) / max(max(a.depth, b.depth), INVISIBLE)) * (b.color - a.color);
+    let middle_depth = (*light).depth + a.depth;
+    let depth = middle_depth + b.depth;
+    let middle = exp2(-middle_depth);
     let transmittance = exp2(-depth);
     // The differences of transmittance add up to exactly what is missing behind.
-    let share = ((*light).transmittance - transmittance) * (num_bins * inverse);
-    (*light).color += share * change.rgb;
+    let share_a = (*light).transmittance - middle;
+    let share_b = middle - transmittance;
+    let shift = share_a * front_weight(a.depth) + share_b * front_weight(b.depth);
+    (*light).color += share_a * a.color + share_b * b.color - shift * slope;
     (*light).depth = depth;
     (*light).transmittance = transmittance;
-    return End(bin, select(sums, from_end.sums, is_flat));
 }
 
 // The light that a ray sees.
@@ -182,8 +256,10 @@ fn light_along(ray: Ray) -> vec3f {
     var place = clamp(floor(ray.start + t * ray.direction), vec3f(0.0), frame.cells - 1.0);
     var light = Light(vec3f(0.0), 0.0, 1.0);
     // The value at t, where the cell before was of the same level; its level, or none.
-    var end = End(0, vec4f(0.0));
+    var end = End(0.0, vec4f(0.0));
     var end_level = NO_LEVEL;
+    // The longest stretch that the next round may take of a cell.
+    var reach = FAR;
     let unit_size = frame.unit_cells;
     while t < t_end && light.depth < OPAQUE_DEPTH && all(place >= vec3f(0.0)) && all(place < frame.cells) {
         let unit = floor((place + 0.5) * frame.units_per_cell);
@@ -213,14 +289,32 @@ fn light_along(ray: Ray) -> vec3f {
         let exit = max(min(smallest(faces), t_end), t);
         // A round without length finds the value where a run of cells begins.
         let is_start = is_matter && level != end_level;
-        let t_next = select(exit, t, is_start);
-
+        let t_far = select(min(exit, t + reach), t, is_start);
         let origin = ray.start - low;
+        let far_middle = value_at(corners, (origin + 0.5 * (t + t_far) * ray.direction) * inverse_scale);
+        let far = value_at(corners, (origin + t_far * ray.direction) * inverse_scale);
+        let bend = abs(2.0 * far_middle - end.value - far);
+        let is_bent = is_matter && !is_start && bend > MAX_BEND * frame.num_bins;
+        let t_next = select(t_far, 0.5 * (t + t_far), is_bent);
+        let last = select(far, far_middle, is_bent);
         let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);
-        let middle = bin_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) * inverse_scale);
-        let last = bin_at(corners, (origin + t_next * ray.direction) * inverse_scale);
-        end = integrate(&light, end, middle, depth);
-        end = integrate(&light, end, last, depth);
+        var middle = far_middle;
+        if is_bent {
+            middle = value_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) * inverse_scale);
+        }
+        let a = piece_to(end, balanced(end.value, middle, last), depth);
+        let b = piece_to(a.end, last, depth);
+        if IS_DENSE {
+            let pair_depth = a.depth + b.depth;
+            let num_bins = abs(middle - end.value) + abs(last - middle);
+            if pair_depth > MAX_PAIR_DEPTH && num_bins > MIN_PAIR_BINS && t_next - t > MIN_REACH {
+                reach = (t_next - t) * max(0.75 * MAX_PAIR_DEPTH / pair_depth, 0.5 * MIN_PAIR_BINS / num_bins);
+                continue;
+            }
+            reach = min(2.0 * reach, FAR);
+        }
+        add_pair(&light, a, b);
+        end = b.end;
         end_level = select(NO_LEVEL, level, is_matter);
 
         let inside = clamp(floor(ray.start + t_next * ray.direction), low, high - 1.0);

@@ -2,7 +2,9 @@
 //! promises. It finds what golden pictures hide.
 
 use glam::DVec3;
-use volery::{BackendChoice, Camera, ControlPoint, Session, TransferFunction, View};
+use volery::{
+    BackendChoice, Camera, ControlPoint, PlaneView, Session, Technique, Thickness, TransferFunction, View,
+};
 use volery_reference::Image;
 use volery_scene::VoxelGrid;
 use volery_tests::{SMOOTH_EXTENT, backend, distance, draw, exact, smooth};
@@ -20,6 +22,8 @@ fn view() -> View {
         transfer: TransferFunction::new(points, 1.0).unwrap(),
         background: [0.0; 3],
         tolerance: None,
+        planes: PlaneView::default(),
+        thickness: Thickness::default(),
     }
 }
 
@@ -58,7 +62,8 @@ fn a_backend_converges_to_the_reference_at_second_order(choice: BackendChoice, t
     for cells in [8, 16, 32] {
         let grid = smooth(cells);
         let Some(backend) = backend(choice, test) else { return };
-        let drawn = exact(&draw(&mut Session::open(grid.clone(), backend).unwrap(), &view).image);
+        let drawn =
+            exact(&draw(&mut Session::open(grid.clone(), backend, Technique::Raycast).unwrap(), &view).image);
         errors.push(distance(&format!("{choice:?}, {cells} cells"), &drawn, &truth(&grid, &view)).rmse);
     }
     let found = orders(&errors);

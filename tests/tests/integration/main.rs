@@ -24,6 +24,9 @@ macro_rules! by_both_backends {
 mod compositing;
 mod convergence;
 mod files;
+mod grids;
 mod opacity;
 mod peers;
+mod planes;
+mod sections;
 mod trees;

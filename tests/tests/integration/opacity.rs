@@ -4,7 +4,7 @@
 //! the distance of samples, the number of bricks and the level of the cut are swept with the same matter.
 
 use glam::DVec3;
-use volery::{BackendChoice, ControlPoint, Session, TransferFunction, View, ViewOptions};
+use volery::{BackendChoice, ControlPoint, Session, Technique, TransferFunction, View, ViewOptions};
 use volery_reference::Image;
 use volery_scene::VoxelGrid;
 use volery_tests::{at_most, backend, distance, draw, exact};
@@ -36,7 +36,7 @@ fn prepared(
     choice: BackendChoice,
     test: &str,
 ) -> Option<(Session, View)> {
-    let session = Session::open(grid, backend(choice, test)?).unwrap();
+    let session = Session::open(grid, backend(choice, test)?, Technique::Raycast).unwrap();
     let options = ViewOptions { width: 64, height: 64, transfer: Some(transfer), ..ViewOptions::default() };
     let view = View { background: [0.0; 3], ..session.view(&options) };
     Some((session, view))

@@ -5,7 +5,7 @@
 
 use std::sync::OnceLock;
 
-use volery::{BackendChoice, Session};
+use volery::{BackendChoice, Session, Technique};
 use volery_io::read_png_rgb;
 use volery_reference::{Image, Tracer};
 use volery_tests::{
@@ -46,7 +46,8 @@ impl Scene {
         let data = data_folder(test)?;
         let make = || {
             let input = read_scene(&data, self.name);
-            let mut session = Session::open(input.volume.grid.clone(), backend(choice, test)?).unwrap();
+            let mut session =
+                Session::open(input.volume.grid.clone(), backend(choice, test)?, Technique::Raycast).unwrap();
             Some(exact(&draw(&mut session, &view_of(&input)).image))
         };
         if choice == BackendChoice::Software {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use rayon::ThreadPoolBuilder;
-use volery::{BackendChoice, Image, Preset, Session, View, ViewOptions};
+use volery::{BackendChoice, Image, Preset, Session, Technique, View, ViewOptions};
 use volery_octree::{DataTolerance, select, validate};
 use volery_pyramid::{Brick, Kind, Layout, Node, NodeSource, Pyramid};
 use volery_scene::VoxelGrid;
@@ -24,7 +24,7 @@ fn hard_volumes() -> Vec<(&'static str, VoxelGrid)> {
 }
 
 fn software(grid: VoxelGrid) -> Session {
-    Session::open(grid, Box::new(SoftwareBackend::new())).unwrap()
+    Session::open(grid, Box::new(SoftwareBackend::new()), Technique::Raycast).unwrap()
 }
 
 /// All values visible, from aslant.
@@ -42,7 +42,7 @@ by_both_backends! { tolerance_zero_is_the_full_resolution_bit_for_bit }
 fn tolerance_zero_is_the_full_resolution_bit_for_bit(choice: BackendChoice, test: &str) {
     for (name, grid) in hard_volumes() {
         let Some(backend) = backend(choice, test) else { return };
-        let mut session = Session::open(grid, backend).unwrap();
+        let mut session = Session::open(grid, backend, Technique::Raycast).unwrap();
         let full = whole_view(&session);
         let zero = View { tolerance: Some(0.0), ..full.clone() };
         let (full, zero) = (draw(&mut session, &full), draw(&mut session, &zero));
@@ -178,7 +178,8 @@ fn the_number_of_threads_does_not_change_a_bit_of_real_data() {
 #[test]
 fn a_volume_of_one_sample_along_an_axis_is_refused_in_one_line() {
     for dims in [[1, 1, 1], [1, 1, 9], [5, 1, 7]] {
-        let opened = Session::open(volery_data::noise(dims, 1), Box::new(SoftwareBackend::new()));
+        let opened =
+            Session::open(volery_data::noise(dims, 1), Box::new(SoftwareBackend::new()), Technique::Raycast);
         let Err(error) = opened else { panic!("{dims:?} was opened") };
         assert!(error.to_string().contains("at least 2"), "{error}");
     }

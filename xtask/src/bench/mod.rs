@@ -1,6 +1,8 @@
-//! `cargo xtask bench`: criterion benches of all crates, and Volery beside VTK.
+//! `cargo xtask bench`: criterion benches of all crates, Volery beside VTK, and the tables of documents.
 
 mod peers;
+mod planes;
+mod reslice;
 mod table;
 mod volery;
 mod vtk;
@@ -25,6 +27,8 @@ pub(crate) struct Options {
 enum Which {
     /// VTK and Volery in turn on the same scenes: time against error.
     Peers(peers::Options),
+    /// Multiresolution planes: bytes and time against error, and the pictures of docs/planes.md.
+    Planes(planes::Options),
 }
 
 /// Runs the benches asked for.
@@ -34,6 +38,7 @@ enum Which {
 pub(crate) fn run(options: &Options) -> Result<(), String> {
     match &options.which {
         Some(Which::Peers(options)) => peers::run(options),
+        Some(Which::Planes(options)) => planes::run(options),
         None => criterion(options.filter.as_deref()),
     }
 }

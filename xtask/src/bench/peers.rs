@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread;
 
+use super::reslice;
 use super::table::{self, Row};
 use super::volery::Volery;
 use super::vtk::{self, Vtk};
@@ -17,8 +18,12 @@ use crate::shell;
 /// Options of `cargo xtask bench peers`.
 #[derive(clap::Args)]
 pub(super) struct Options {
-    /// Scenes by name
-    #[arg(long, value_delimiter = ',', default_value = "engine,engine_inside,heptane,mri,tooth16")]
+    /// Scenes by name; `plane_N` is an oblique plane in N x N pixels through the mouse
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "engine,engine_inside,heptane,mri,tooth16,plane_512,plane_1024"
+    )]
     scenes: Vec<String>,
     /// Frames per program, setting and round
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
@@ -38,17 +43,25 @@ pub(super) struct Options {
 pub(super) fn run(options: &Options) -> Result<(), String> {
     let data = shell::data_folder()?.ok_or("no folder ../shared/data, and VOLERY_DATA is not set")?;
     let folder = super::work_folder()?;
-    let scenes: Vec<PathBuf> =
-        options.scenes.iter().map(|name| scene_file(&data, name)).collect::<Result<_, _>>()?;
+    let is_rays = |name: &&String| reslice::side(name).is_none();
+    options.scenes.iter().filter(is_rays).try_for_each(|name| scene_file(&data, name).map(drop))?;
     let volery = Volery::build(&folder)?;
     let mut vtk = Vtk::start(&folder)?;
     println!("{}", vtk.about);
 
     let mut rows = Vec::new();
     let mut devices = Vec::new();
-    for (name, scene) in options.scenes.iter().zip(&scenes) {
+    for name in &options.scenes {
         println!("== {name}");
-        let reference = volery.write_reference(scene, &data)?;
+        if let Some(side) = reslice::side(name) {
+            let repeats = [options.frames, options.rounds];
+            let of_scene = reslice::measure((&volery, &mut vtk), (&data, &folder), side, repeats)?;
+            println!("{}", table::markdown(&of_scene, &[]));
+            rows.extend(of_scene);
+            continue;
+        }
+        let scene = &scene_file(&data, name)?;
+        let reference = volery.write_reference(scene, &data, None)?;
         vtk.load(scene, &data, &reference)?;
         let mut of_vtk =
             vtk::SETTINGS.map(|(mapper, step)| Row::new(name, vtk::program(mapper), &format!("step {step}")));
@@ -60,7 +73,7 @@ pub(super) fn run(options: &Options) -> Result<(), String> {
             }
             for (slot, backend) in of_volery.iter_mut().zip(BACKENDS) {
                 let Some(row) = slot else { continue };
-                match volery.draw((scene, &data), (backend, options.frames), round == 0, row) {
+                match volery.draw((scene, &data), (backend, options.frames), &[], round == 0, row) {
                     Ok(device) if devices.contains(&device) => {}
                     Ok(device) => devices.push(device),
                     Err(error) => {
@@ -77,7 +90,8 @@ pub(super) fn run(options: &Options) -> Result<(), String> {
     write(&rows, &about(options, &vtk.about, &devices), &folder, options.update_readme)
 }
 
-const BACKENDS: [&str; 2] = ["software", "wgpu"];
+/// Who draws of Volery.
+pub(super) const BACKENDS: [&str; 2] = ["software", "wgpu"];
 
 /// The scene files lie beside the data: `peers/scenes/NAME.json`.
 fn scene_file(data: &Path, name: &str) -> Result<PathBuf, String> {
@@ -112,8 +126,8 @@ fn write(rows: &[Row], about: &[String], folder: &Path, update_readme: bool) -> 
     if update_readme {
         let readme = shell::root().join("README.md");
         let text = fs::read_to_string(&readme).map_err(|error| format!("{}: {error}", readme.display()))?;
-        let pasted =
-            table::pasted(&text, &table).map_err(|error| format!("{}: {error}", readme.display()))?;
+        let pasted = table::pasted(&text, "peers", &table)
+            .map_err(|error| format!("{}: {error}", readme.display()))?;
         save(&readme, &pasted)?;
     }
     Ok(())

@@ -38,6 +38,15 @@ impl Row {
         Self { scene, program, setting, seconds: Vec::new(), reference: None, own_converged: None }
     }
 
+    /// Adds what VTK answers.
+    pub(super) fn take(&mut self, reply: &Value) -> Result<(), String> {
+        let seconds = reply["seconds"].as_array().ok_or_else(|| format!("VTK answers {reply}"))?;
+        self.seconds.extend(seconds.iter().filter_map(Value::as_f64));
+        self.reference = Error::read(&reply["errors"]["reference"]);
+        self.own_converged = Error::read(&reply["errors"]["vtk_converged"]);
+        Ok(())
+    }
+
     /// Median and shortest time in milliseconds.
     fn milliseconds(&self) -> Option<(f64, f64)> {
         let mut sorted = self.seconds.clone();
@@ -47,13 +56,17 @@ impl Row {
     }
 }
 
-/// The row that others are compared with.
+/// The row that others of a scene of rays are compared with.
 const YARDSTICK: (&str, &str) = ("VTK GPU ray cast", "step 0.5");
+
+/// The same for planes.
+pub(super) const RESLICE: (&str, &str) = ("vtkImageReslice", "linear");
 
 /// Times of a row over those of the yardstick on the same scene.
 fn ratio(rows: &[Row], row: &Row) -> Option<f64> {
     let is_yardstick = |other: &&Row| {
-        other.scene == row.scene && (other.program.as_str(), other.setting.as_str()) == YARDSTICK
+        let program = (other.program.as_str(), other.setting.as_str());
+        other.scene == row.scene && [YARDSTICK, RESLICE].contains(&program)
     };
     Some(row.milliseconds()?.0 / rows.iter().find(is_yardstick)?.milliseconds()?.0)
 }
@@ -61,7 +74,7 @@ fn ratio(rows: &[Row], row: &Row) -> Option<f64> {
 /// A table in Markdown; `about` are lines that say where and how it was measured.
 pub(super) fn markdown(rows: &[Row], about: &[String]) -> String {
     let mut text = String::from(
-        "| scene | program | setting | ms, median (min) | of VTK GPU .5 | rmse | max | rmse to VTK's own |\n\
+        "| scene | program | setting | ms, median (min) | of VTK GPU .5, of reslice | rmse | max | rmse to VTK's own |\n\
          |---|---|---|---|---|---|---|---|\n",
     );
     let number =
@@ -99,17 +112,15 @@ pub(super) fn json(rows: &[Row], about: &[String]) -> Value {
     json!({"about": about, "rows": rows.iter().map(row).collect::<Vec<_>>()})
 }
 
-const BEGIN: &str = "<!-- peers:begin -->";
-const END: &str = "<!-- peers:end -->";
-
-/// `readme` with the text between its markers replaced.
+/// `text` with what stands between the markers `NAME:begin` and `NAME:end` replaced.
 ///
 /// # Errors
 /// When the markers are missing.
-pub(super) fn pasted(readme: &str, table: &str) -> Result<String, String> {
-    let markers = readme.split_once(BEGIN).and_then(|(before, rest)| Some((before, rest.split_once(END)?.1)));
-    let (before, after) = markers.ok_or_else(|| format!("no {BEGIN} with an {END} after it"))?;
-    Ok(format!("{before}{BEGIN}\n{table}{END}{after}"))
+pub(super) fn pasted(text: &str, name: &str, table: &str) -> Result<String, String> {
+    let [begin, end] = ["begin", "end"].map(|side| format!("<!-- {name}:{side} -->"));
+    let markers = text.split_once(&begin).and_then(|(before, rest)| Some((before, rest.split_once(&end)?.1)));
+    let (before, after) = markers.ok_or_else(|| format!("no {begin} with an {end} after it"))?;
+    Ok(format!("{before}{begin}\n{table}{end}{after}"))
 }
 
 #[cfg(test)]
@@ -142,9 +153,12 @@ mod tests {
     }
 
     #[test]
-    fn a_readme_takes_the_table_between_its_markers_only() {
-        let readme = format!("a\n{BEGIN}\nold\n{END}\nb\n");
-        assert_eq!(pasted(&readme, "new\n").unwrap(), format!("a\n{BEGIN}\nnew\n{END}\nb\n"));
-        assert!(pasted(END, "new").is_err() && pasted(&format!("{END}{BEGIN}"), "new").is_err());
+    fn a_document_takes_the_table_between_its_markers_only() {
+        let (begin, end) = ("<!-- peers:begin -->", "<!-- peers:end -->");
+        let readme = format!("a\n{begin}\nold\n{end}\nb\n");
+        let expected = format!("a\n{begin}\nnew\n{end}\nb\n");
+        assert_eq!(pasted(&readme, "peers", "new\n").unwrap(), expected);
+        assert!(pasted(end, "peers", "new").is_err() && pasted(&readme, "planes", "new").is_err());
+        assert!(pasted(&format!("{end}{begin}"), "peers", "new").is_err());
     }
 }

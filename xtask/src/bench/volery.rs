@@ -33,10 +33,15 @@ impl Volery {
         })
     }
 
-    /// Writes the true picture of a scene as `.npy` for VTK to be compared with; returns the file.
-    pub(super) fn write_reference(&self, scene: &Path, data: &Path) -> Result<PathBuf, String> {
+    /// Writes the true picture of a scene, or of a plane through its volume, as `.npy` for VTK to be compared with; returns the file.
+    pub(super) fn write_reference(
+        &self,
+        scene: &Path,
+        data: &Path,
+        plane: Option<&str>,
+    ) -> Result<PathBuf, String> {
         let output = self.folder.join("reference.npy");
-        shell::run(Command::new(&self.reference_picture).args([scene, data, &output]))?;
+        shell::run(Command::new(&self.reference_picture).args([scene, data, &output]).args(plane))?;
         Ok(output)
     }
 
@@ -49,12 +54,13 @@ impl Volery {
         &self,
         (scene, data): (&Path, &Path),
         (backend, frames): (&str, u32),
+        options: &[&str],
         verify: bool,
         row: &mut Row,
     ) -> Result<String, String> {
         let (picture, report) = (self.folder.join("volery.png"), self.folder.join("volery.json"));
         let mut command = Command::new(&self.program);
-        command.arg("render").arg(scene).arg("--data").arg(data).arg("-o").arg(picture);
+        command.args(["render"]).args(options).arg(scene).arg("--data").arg(data).arg("-o").arg(picture);
         // One more than is measured: the first pays for the upload, as VTK's first does.
         command.args(["--backend", backend, "--frames", &(frames + 1).to_string(), "--report"]).arg(&report);
         if verify {

@@ -6,7 +6,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use serde_json::{Value, json};
 
-use super::table::{Error, Row};
+use super::table::Row;
 use crate::{apt, shell};
 
 /// What VTK draws with: mapper and step in voxels.
@@ -75,11 +75,19 @@ impl Vtk {
     /// Draws the loaded scene and adds the times to the row.
     pub(super) fn draw(&mut self, mapper: &str, step: f64, frames: u32, row: &mut Row) -> Result<(), String> {
         let reply = self.ask(&json!({"do": "draw", "mapper": mapper, "step": step, "frames": frames}))?;
-        let seconds = reply["seconds"].as_array().ok_or_else(|| format!("VTK answers {reply}"))?;
-        row.seconds.extend(seconds.iter().filter_map(Value::as_f64));
-        row.reference = Error::read(&reply["errors"]["reference"]);
-        row.own_converged = Error::read(&reply["errors"]["vtk_converged"]);
-        Ok(())
+        row.take(&reply)
+    }
+
+    /// Loads the volume of a scene, to be cut by a plane through the camera's target.
+    pub(super) fn load_plane(&mut self, scene: &Path, data: &Path, reference: &Path) -> Result<(), String> {
+        let request = json!({"do": "load_plane", "scene": scene, "data": data, "reference": reference});
+        self.ask(&request).map(drop)
+    }
+
+    /// Cuts the loaded volume and adds the times to the row.
+    pub(super) fn reslice(&mut self, frames: u32, row: &mut Row) -> Result<(), String> {
+        let reply = self.ask(&json!({"do": "reslice", "frames": frames}))?;
+        row.take(&reply)
     }
 
     fn ask(&mut self, request: &Value) -> Result<Value, String> {
@@ -112,11 +120,20 @@ fn environment(folder: &Path) -> Result<PathBuf, String> {
             make()?;
         }
     }
-    let has_vtk =
-        shell::run(Command::new(&python).args(["-c", "import vtkmodules, numpy"]).stderr(Stdio::null()));
+    let has_vtk = shell::run(
+        Command::new(&python).args(["-c", "import vtkmodules, numpy, zstandard"]).stderr(Stdio::null()),
+    );
     if has_vtk.is_err() {
-        println!("installing vtk and numpy through pip");
-        shell::run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "vtk", "numpy"]))?;
+        println!("installing vtk, numpy and zstandard through pip");
+        shell::run(Command::new(&python).args([
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "vtk",
+            "numpy",
+            "zstandard",
+        ]))?;
     }
     Ok(python)
 }

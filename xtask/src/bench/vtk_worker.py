@@ -3,6 +3,8 @@
   {"do": "probe"}                                                        {"vtk", "window", "device"}
   {"do": "load", "scene": FILE, "data": DIR, "reference": NPY or null}   {"name", "dims"}
   {"do": "draw", "mapper": "gpu"|"fixed", "step": VOXELS, "frames": N}   {"seconds": [..], "errors": {..}}
+  {"do": "load_plane", "scene": FILE, "data": DIR, "reference": NPY}     {"name", "dims"}
+  {"do": "reslice", "frames": N}                                         {"seconds": [..], "errors": {..}}
 
 A draw makes a window, draws one frame that is not timed (upload, shader compilation) and keeps it as the picture,
 then times N frames with the camera turned by a ten-thousandth of a degree between them. A frame ends when OpenGL has
@@ -21,10 +23,17 @@ if "DISPLAY" not in os.environ:
 
 import numpy as np
 import vtk
+import zstandard
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
 CONVERGED_STEP_VOXELS = 1 / 16
 TURN_DEGREES = 1e-4
+
+
+def open_raw(file):
+    if file.endswith(".zst"):
+        return zstandard.open(file, "rb")
+    return (gzip.open if file.endswith(".gz") else open)(file, "rb")
 
 
 def read_volume(file, layout):
@@ -37,7 +46,7 @@ def read_volume(file, layout):
         dims, spacing = read.GetDimensions(), read.GetSpacing()
         samples = vtk_to_numpy(read.GetPointData().GetScalars())
     else:
-        with (gzip.open if file.endswith(".gz") else open)(file, "rb") as stream:
+        with open_raw(file) as stream:
             stored = np.frombuffer(stream.read(), dtype=layout["dtype"])
         dims, spacing = layout["dims"], layout.get("spacing", (1, 1, 1))
         samples = stored.astype(stored.dtype.newbyteorder("="))
@@ -77,6 +86,50 @@ def mapper_of(kind, step_world):
     mapper.SetAutoAdjustSampleDistances(False)
     mapper.SetSampleDistance(step_world)
     return mapper
+
+
+class Plane:
+    """The plane through the target of a scene's orthographic camera, seen straight, cut by vtkImageReslice."""
+
+    def __init__(self, file, data_folder, reference_file):
+        with open(file, encoding="utf-8") as stream:
+            self.described = json.load(stream)
+        source, camera = self.described["input"], self.described["camera"]
+        self.volume = read_volume(os.path.join(data_folder, source["file"]), source)
+        self.reference = np.load(reference_file).astype(float)
+        width, height = self.described["size"]
+        pixel = camera["height"] / height
+        forward = np.subtract(camera["target"], camera["eye"])
+        forward = forward / np.linalg.norm(forward)
+        right = np.cross(forward, camera["up"])
+        right = right / np.linalg.norm(right)
+        up = np.cross(right, forward)
+        axes = vtk.vtkMatrix4x4()
+        for column, axis in enumerate([right, up, -forward, camera["target"]]):
+            for row in range(3):
+                axes.SetElement(row, column, axis[row])
+        self.reslice = vtk.vtkImageReslice()
+        self.reslice.SetInputData(self.volume)
+        self.reslice.SetResliceAxes(axes)
+        self.reslice.SetOutputDimensionality(2)
+        self.reslice.SetInterpolationModeToLinear()
+        self.reslice.SetOutputSpacing(pixel, pixel, 1)
+        self.reslice.SetOutputExtent(0, width - 1, 0, height - 1, 0, 0)
+        self.reslice.SetOutputOrigin(-(width - 1) / 2 * pixel, -(height - 1) / 2 * pixel, 0)
+        self.reslice.SetBackgroundLevel(0)
+
+    def draw(self, frames):
+        """The picture as rows of RGB in [0, 1], top row first, and the seconds of each of `frames` further cuts."""
+        self.reslice.Update()
+        width, height = self.described["size"]
+        values = vtk_to_numpy(self.reslice.GetOutput().GetPointData().GetScalars()).reshape(height, width, 1)
+        seconds = []
+        for _ in range(frames):
+            self.reslice.Modified()
+            start = time.perf_counter()
+            self.reslice.Update()
+            seconds.append(time.perf_counter() - start)
+        return np.repeat(values[::-1] / 255.0, 3, axis=2), seconds
 
 
 class Scene:
@@ -166,7 +219,7 @@ def probe():
 
 
 def main():
-    scene = None
+    scene = plane = None
     for line in sys.stdin:
         request = json.loads(line)
         if request["do"] == "probe":
@@ -174,6 +227,12 @@ def main():
         elif request["do"] == "load":
             scene = Scene(request["scene"], request["data"], request["reference"])
             reply = {"name": scene.described["name"], "dims": scene.volume.GetDimensions()}
+        elif request["do"] == "load_plane":
+            plane = Plane(request["scene"], request["data"], request["reference"])
+            reply = {"name": plane.described["name"], "dims": plane.volume.GetDimensions()}
+        elif request["do"] == "reslice":
+            picture, seconds = plane.draw(request["frames"])
+            reply = {"seconds": seconds, "errors": {"reference": error(picture, plane.reference)}}
         else:
             picture, seconds = scene.draw(request["mapper"], request["step"], request["frames"])
             reply = {"seconds": seconds, "errors": scene.errors(picture)}

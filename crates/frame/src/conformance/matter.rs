@@ -195,3 +195,47 @@ pub fn thin_shell_is_not_missed(backend: &mut dyn Backend) {
     // The shell is six bins of values wide.
     assert_close("thin shell", &image, &expected, 0.02, 2e-3);
 }
+
+/// Thin matter whose values lie above those of opaque matter: sums over values must not drown it.
+pub fn thin_matter_above_opaque_values(backend: &mut dyn Backend) {
+    let volume = Volume::new([18, 17, 33], DVec3::ONE, Storage::F32, |p| {
+        if p.z == 0.0 { 0.0 } else { 0.7 + 0.003 * p.z + 0.001 * p.x }
+    });
+    let points = [
+        [0.0, 1.0, 0.2, 0.1, 1.0],
+        [0.5, 1.0, 0.2, 0.1, 1.0],
+        [0.6, 0.2, 0.5, 1.0, 0.01],
+        [0.9, 0.2, 0.8, 1.0, 0.02],
+    ];
+    let tf = transfer(&points, 1.0);
+    let camera = Camera::fitted(volume.extent(), 25.0, 40.0, 1.0, false);
+    let expected = march_volume(&volume, &tf, 500.0, &camera, SIZE, BACKGROUND_F64);
+    assert_shows_something("thin above opaque", &expected, BACKGROUND_F64);
+    let image = draw(backend, &volume, &tf, &camera, SIZE);
+    assert_close("thin above opaque", &image, &expected, 0.01, 3e-4);
+}
+
+/// A cell that spans many optical depths and whose colour changes: what is seen is its front.
+pub fn dense_cells_show_their_front(backend: &mut dyn Backend) {
+    let field = |p: DVec3| {
+        let q = p.x + 2.0 * p.y + 3.0 * p.z;
+        0.5 + 0.5 * (2.3 * q).sin()
+    };
+    let points = [
+        [0.0, 0.1, 0.1, 0.9, 0.0],
+        [0.3, 0.1, 0.9, 0.2, 0.4],
+        [0.6, 1.0, 0.2, 0.1, 0.6],
+        [1.0, 1.0, 1.0, 0.9, 0.9],
+    ];
+    for (dims, unit_distance) in [([2, 2, 2], 0.1), ([4, 3, 5], 0.05), ([3, 4, 4], 0.02)] {
+        let volume = Volume::new(dims, DVec3::ONE, Storage::F32, field);
+        let tf = transfer(&points, unit_distance);
+        for orthographic in [false, true] {
+            let camera = Camera::fitted(volume.extent(), 35.0, 25.0, 1.2, orthographic);
+            let expected = march_volume(&volume, &tf, 2000.0, &camera, SIZE, BACKGROUND_F64);
+            assert_shows_something("dense cells", &expected, BACKGROUND_F64);
+            let image = draw(backend, &volume, &tf, &camera, SIZE);
+            assert_close(&format!("dense cells {dims:?}"), &image, &expected, 0.02, 1e-3);
+        }
+    }
+}

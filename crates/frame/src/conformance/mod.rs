@@ -3,8 +3,10 @@
 //! # Method
 //! Pictures are compared with closed forms where there are any, else with a slow march in f64 through the
 //! field that the bricks were cut from (`oracle::march`), midpoint rule, many steps per cell. The
-//! marcher shares nothing with a backend but the camera's rays and the transfer function. Every check
-//! prints its threshold beside the value that it measured.
+//! marcher shares nothing with a backend but the camera's rays and the transfer function. Cutting planes are
+//! compared with a search through all bricks for every pixel (`plane_oracle`); where that picture jumps within a
+//! few thousandths of a pixel either side is right, and such pixels are counted. Every check prints its threshold
+//! beside the value that it measured.
 //!
 //! # What a backend may do
 //! - Stop a ray once it lets through less than [`STOP_TRANSMITTANCE`] of the light; thresholds allow for it.
@@ -24,6 +26,8 @@ mod levels;
 mod matter;
 mod oracle;
 mod order;
+mod plane_oracle;
+mod planes;
 mod requests;
 mod sampling;
 mod views;
@@ -72,7 +76,9 @@ properties! { $
         nearly_opaque_matter
         opaque_matter_hides_what_is_behind
         opaque_step_stands_at_its_value
-        thin_shell_is_not_missed;
+        thin_shell_is_not_missed
+        thin_matter_above_opaque_values
+        dense_cells_show_their_front;
     views:
         eye_inside
         eye_on_the_corner_of_bricks
@@ -126,6 +132,26 @@ properties! { $
         a_new_volume_forgets_bricks
         resident_bytes_count_the_texels
         many_uploads_one_by_one;
+    planes:
+        planes_show_the_trilinear_field
+        a_ramp_is_linear_on_planes_of_any_cut
+        bricks_blend_by_their_corners
+        low_samples_are_the_parents
+        nearest_samples
+        transparent_planes_cross
+        steps_of_the_transfer_function
+        values_at_a_step_are_past_it
+        blank_cells_show_what_is_behind
+        colors_show_themselves
+        images_are_volumes_of_one_layer
+        outlines_of_bricks
+        planes_in_faces_are_seen_once
+        planes_that_are_not_seen
+        planes_of_far_eyes_and_odd_cells
+        absent_and_short_bricks_show_what_is_behind
+        few_bricks_in_a_large_volume
+        planes_and_rays_in_turn
+        wrong_frames_of_planes_are_named;
 }
 
 #[cfg(test)]
@@ -141,6 +167,7 @@ mod tests {
             include_str!("compositing.rs"),
             include_str!("order.rs"),
             include_str!("requests.rs"),
+            include_str!("planes.rs"),
         ];
         let written = sources.iter().flat_map(|text| text.lines());
         let written: Vec<_> = written.filter(|line| line.starts_with("pub fn ")).collect();

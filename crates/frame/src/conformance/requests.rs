@@ -3,7 +3,10 @@
 use glam::DVec3;
 use volery_scene::Camera;
 
-use crate::{Backend, Brick, BrickId, DrawError, Frame, Image, PlacedBrick, TexelType, Texels, UploadError};
+use crate::{
+    Backend, Brick, BrickId, Content, DrawError, Frame, Image, PlacedBrick, Rays, TexelType, Texels,
+    UploadError,
+};
 
 use super::oracle::{assert_background, assert_close, assert_same_bits, march_volume};
 use super::world::{
@@ -27,7 +30,8 @@ fn draw_placed(
     bricks: &[PlacedBrick],
 ) -> Result<Image, DrawError> {
     let transfer = &volume.integrated(&smooth_transfer(1.0));
-    let frame = Frame { width, height, camera: *camera, transfer, background: BACKGROUND, bricks };
+    let content = Content::Rays(Rays { transfer, bricks });
+    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, content };
     backend.draw(&frame).map(|drawn| drawn.image)
 }
 

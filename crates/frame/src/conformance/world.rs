@@ -4,7 +4,8 @@ use glam::{DVec3, UVec3};
 use volery_scene::{Camera, ControlPoint, Projection, TransferFunction};
 
 use crate::{
-    Backend, Brick, BrickId, Frame, Image, IntegratedTransfer, PlacedBrick, TexelType, Texels, VolumeLayout,
+    Backend, Brick, BrickId, Content, Frame, Image, IntegratedTransfer, PlacedBrick, Rays, TexelType, Texels,
+    VolumeLayout,
 };
 
 pub(super) const BACKGROUND: [f32; 3] = [0.125, 0.25, 0.5];
@@ -32,7 +33,7 @@ impl Storage {
         let value_scale = match texel {
             TexelType::U8 => 1.0 / 255.0,
             TexelType::U16 => 1.0 / 65535.0,
-            TexelType::F32 => 1.0,
+            TexelType::F32 | TexelType::Rgba8 => 1.0,
         };
         Self { value_scale, ..Self::plain(texel) }
     }
@@ -57,6 +58,7 @@ pub(super) enum OwnedTexels {
     U8(Vec<u8>),
     U16(Vec<u16>),
     F32(Vec<f32>),
+    Rgba8(Vec<[u8; 4]>),
 }
 
 impl OwnedBrick {
@@ -65,6 +67,7 @@ impl OwnedBrick {
             OwnedTexels::U8(texels) => Texels::U8(texels),
             OwnedTexels::U16(texels) => Texels::U16(texels),
             OwnedTexels::F32(texels) => Texels::F32(texels),
+            OwnedTexels::Rgba8(texels) => Texels::Rgba8(texels),
         };
         Brick { id: self.placed.id, samples: self.samples, texels }
     }
@@ -150,6 +153,7 @@ impl Volume {
             TexelType::U8 => OwnedTexels::U8(texels.iter().map(|&t| t as u8).collect()),
             TexelType::U16 => OwnedTexels::U16(texels.iter().map(|&t| t as u16).collect()),
             TexelType::F32 => OwnedTexels::F32(texels.iter().map(|&t| t as f32).collect()),
+            TexelType::Rgba8 => OwnedTexels::Rgba8(texels.iter().map(|&t| color_of(t)).collect()),
         };
         OwnedBrick { placed: PlacedBrick { id, first_cell, level }, samples, texels }
     }
@@ -213,7 +217,13 @@ fn texel_of(layout: &VolumeLayout, value: f64) -> f64 {
         TexelType::U8 => texel.round().clamp(0.0, 255.0),
         TexelType::U16 => texel.round().clamp(0.0, 65535.0),
         TexelType::F32 => f64::from(texel as f32),
+        TexelType::Rgba8 => texel,
     }
+}
+
+/// The colour that stores a value from 0 to 1: four channels that differ.
+pub(super) fn color_of(value: f64) -> [u8; 4] {
+    [value, 1.0 - value, value * value, 1.0 - 0.75 * value].map(|x| (x * 255.0).round() as u8)
 }
 
 /// The value as it comes back from its texel.
@@ -240,7 +250,8 @@ pub(super) fn draw_resident(
     assert!(camera.defects().is_empty(), "the suite's camera: {:?}", camera.defects());
     let placed: Vec<_> = bricks.iter().map(|brick| brick.placed).collect();
     let transfer = &volume.integrated(transfer);
-    let frame = Frame { width, height, camera: *camera, transfer, background: BACKGROUND, bricks: &placed };
+    let content = Content::Rays(Rays { transfer, bricks: &placed });
+    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, content };
     let drawn = backend.draw(&frame).expect("every brick is resident and in its place");
     assert_eq!((drawn.image.width, drawn.image.height), (width, height), "size of the picture");
     assert!(drawn.device_seconds.is_none_or(|s| s >= 0.0 && s.is_finite()), "{:?}", drawn.device_seconds);

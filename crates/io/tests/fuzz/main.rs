@@ -11,6 +11,9 @@
 #[path = "../readers/make.rs"]
 #[allow(dead_code, reason = "the readers' tests use more of it")]
 mod make;
+#[path = "../readers/make_grid.rs"]
+#[allow(dead_code, reason = "the readers' tests use more of it")]
+mod make_grid;
 mod memory;
 mod mutate;
 mod seeds;
@@ -19,6 +22,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use volery_io::grid::{GridOptions, is_grid, read_array_ranges, read_grid};
 use volery_io::transfer::TransferOptions;
 use volery_io::{Element, ReadOptions, SceneFile, read_transfer, read_volume};
 
@@ -38,6 +42,8 @@ fn read_case(path: &Path) -> Result<(), String> {
     let name = path.file_name().unwrap().to_string_lossy().into_owned();
     let line = if name.ends_with("scene.json") {
         SceneFile::read(path).err().map(|error| error.to_string())
+    } else if is_grid(path) {
+        read_grid_case(path)
     } else if name.ends_with(".json") {
         let options = TransferOptions { map: None, range: Some([0.0, 9.0]), unit_distance: 1.0 };
         read_transfer(path, &options).err().map(|error| error.to_string())
@@ -60,6 +66,19 @@ fn read_case(path: &Path) -> Result<(), String> {
             Err(format!("the error is no short line: {line}"))
         }
         _ => Ok(()),
+    }
+}
+
+/// Reads a grid and all its arrays; of errors, the one with more to say.
+fn read_grid_case(path: &Path) -> Option<String> {
+    let options = GridOptions { max_bytes: MAX_BYTES, ..GridOptions::default() };
+    let ranges = read_array_ranges(path, &options).err().map(|error| error.to_string());
+    match read_grid(path, &options) {
+        Err(error) => Some(error.to_string()).max(ranges),
+        Ok(file) => {
+            std::hint::black_box((file.grid.defects(), file.grid.world_bounds()));
+            ranges
+        }
     }
 }
 
@@ -131,6 +150,10 @@ families! {
     nrrd: "a.nrrd", seeds::nrrd();
     metaimage: "a.mha", seeds::metaimage();
     vti: "a.vti", seeds::vti();
+    vtu: "a.vtu", seeds::vtu();
+    pvtu: "a.pvtu", seeds::pvtu();
+    legacy_vtk: "a.vtk", seeds::legacy_vtk();
+    exodus: "a.ex2", seeds::exodus();
     png: "a.png", seeds::png();
     jpeg: "a.jpg", seeds::jpeg();
     tiff: "a.tif", seeds::tiff();
@@ -177,6 +200,65 @@ fn promises_of_sixty_gigabytes_allocate_nothing() {
         let (result, peak) = peak_during(|| read_volume(&path, &ReadOptions::default()));
         println!("{name}: {peak} bytes allocated at most, {}", result.as_ref().unwrap_err());
         assert!(peak < 2 << 20, "{name}: {peak} bytes");
+    }
+}
+
+/// Grids of a kilobyte that promise billions of points, cells or nodes.
+#[test]
+fn promises_of_large_grids_allocate_nothing() {
+    use make_grid::{ASCII, Form, Packing, usual_vtu};
+    let _alone = memory::alone();
+    let folder = folder();
+    let counts = ["NumberOfPoints=\"12\"", "NumberOfCells=\"8\""];
+    let mut files = Vec::new();
+    for data in make::VTI_DATA {
+        for packing in [Packing::None, Packing::Zlib, Packing::Lz4] {
+            for count in counts {
+                let file = usual_vtu(Form { data, packing, ..ASCII });
+                let start = file.windows(count.len()).position(|window| window == count.as_bytes()).unwrap();
+                let name = count.split('=').next().unwrap();
+                let promise = format!("{name}=\"2000000000\"").into_bytes();
+                let rest = file[start + count.len()..].to_vec();
+                files.push(("a.vtu", [file[..start].to_vec(), promise, rest].concat()));
+            }
+        }
+    }
+    let legacy = String::from_utf8(include_bytes!("../readers/vtk/ascii_51.vtk").to_vec()).unwrap();
+    for (from, to) in [("POINTS 12", "POINTS 2000000000"), ("CELLS 9 48", "CELLS 2000000000 2000000000")] {
+        files.push(("a.vtk", legacy.replace(from, to).into_bytes()));
+    }
+    let mut exodus = make_grid::exodus();
+    exodus.ints("connect1", &[("num_nodes", 12), ("num_info", 2_000_000_000)], Some("HEX8"), &[1; 8]);
+    files.push(("a.ex2", exodus.file()));
+    for (name, file) in files {
+        let path = folder.path().join(name);
+        std::fs::write(&path, file).unwrap();
+        let (result, peak) = peak_during(|| read_grid(&path, &GridOptions::default()));
+        println!("{name}: {peak} bytes allocated at most, {:?}", result.map_err(|error| error.to_string()));
+        assert!(peak < 2 << 20, "{name}: {peak} bytes");
+    }
+}
+
+/// 256 MiB of equal numbers in packed blocks, where twelve are expected.
+#[test]
+fn bombs_in_packed_blocks_stop() {
+    use make_grid::{ASCII, Form, Packing};
+    let _alone = memory::alone();
+    let folder = folder();
+    let bomb = vec![0.0; 1 << 25];
+    for packing in [Packing::Zlib, Packing::Lz4] {
+        let form = Form { data: make::VtiData::AppendedRaw, packing, wide: true, ..ASCII };
+        let file = form.vtu(&make_grid::CELLS, &[("Name=\"p\"", "Float64", bomb.clone())], &[]);
+        println!("{packing:?}: {} bytes", file.len());
+        let path = folder.path().join("a.vtu");
+        std::fs::write(&path, file).unwrap();
+        let (result, peak) = peak_during(|| read_grid(&path, &GridOptions::default()));
+        let line = result.unwrap_err().to_string();
+        assert!(
+            line.ends_with("p: the array by its block table holds 268435456 bytes, expected 96"),
+            "{line}"
+        );
+        assert!(peak < 8 << 20, "{peak} bytes");
     }
 }
 

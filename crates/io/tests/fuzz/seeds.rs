@@ -7,6 +7,7 @@ use volery_io::ByteOrder::{Big, Little};
 use volery_scene::SampleType;
 
 use crate::make::{self, Nifti, VTI_DATA, Vti};
+use crate::make_grid::{self, CELLS, Form, Packing, usual_vtu};
 
 fn big() -> Vec<u8> {
     make::payload(SampleType::U16, Big)
@@ -69,6 +70,48 @@ pub(crate) fn vti() -> Vec<Vec<u8>> {
         }
     }
     files
+}
+
+/// What VTK wrote and what is made by hand, in every form.
+pub(crate) fn vtu() -> Vec<Vec<u8>> {
+    let mut files = vec![
+        include_bytes!("../readers/vtk/ascii.vtu").to_vec(),
+        include_bytes!("../readers/vtk/lz4_inline_wide.vtu").to_vec(),
+        include_bytes!("../readers/vtk/lzma_raw.vtu").to_vec(),
+        include_bytes!("../readers/vtk/lzma_base64_big_wide.vtu").to_vec(),
+    ];
+    for data in VTI_DATA {
+        for packing in [Packing::None, Packing::Zlib, Packing::Lz4] {
+            let form = Form { data, packing, order: Big, wide: packing == Packing::None };
+            files.push(usual_vtu(form));
+            let ghosts = ("Name=\"vtkGhostType\"", "UInt8", vec![1.0; 8]);
+            let values = ("Name=\"q\" NumberOfComponents=\"2\"", "Int16", vec![3.0; 16]);
+            files.push(form.vtu(&CELLS, &[], &[ghosts, values]));
+        }
+    }
+    files
+}
+
+/// Names of pieces: one is itself, which is no piece, others are not there.
+pub(crate) fn pvtu() -> Vec<Vec<u8>> {
+    let text =
+        br#"<VTKFile type="PUnstructuredGrid" byte_order="LittleEndian"><PUnstructuredGrid GhostLevel="0">
+        <PPointData Scalars="p"><PDataArray type="Float32" Name="p"/></PPointData>
+        <Piece Source="a.pvtu"/><Piece Source="../nowhere.vtu"/></PUnstructuredGrid></VTKFile>"#;
+    vec![text.to_vec()]
+}
+
+pub(crate) fn exodus() -> Vec<Vec<u8>> {
+    vec![make_grid::exodus().file()]
+}
+
+pub(crate) fn legacy_vtk() -> Vec<Vec<u8>> {
+    vec![
+        include_bytes!("../readers/vtk/ascii_42.vtk").to_vec(),
+        include_bytes!("../readers/vtk/ascii_51.vtk").to_vec(),
+        include_bytes!("../readers/vtk/binary_42.vtk").to_vec(),
+        include_bytes!("../readers/vtk/binary_51.vtk").to_vec(),
+    ]
 }
 
 pub(crate) fn png() -> Vec<Vec<u8>> {

@@ -2,8 +2,10 @@
 //! truncated, lying and hostile ones.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod grids;
 mod images;
 mod make;
+mod make_grid;
 mod nifti;
 mod outputs;
 mod raw;

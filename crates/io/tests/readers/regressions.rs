@@ -1,10 +1,11 @@
 //! What the fuzzer found, kept small.
 
-use volery_io::read_transfer;
 use volery_io::transfer::TransferOptions;
+use volery_io::{GridOptions, read_grid, read_transfer};
 
 use crate::Folder;
 use crate::make::zlib;
+use crate::make_grid::exodus;
 
 /// A tag of 2 million values in a file of 400 bytes made the decoder allocate 64 MiB before it could be
 /// limited. (The allocation itself is measured by the fuzzer's harness.)
@@ -58,4 +59,18 @@ fn png_palette_that_is_not_of_whole_colours() {
         let line = folder.refuse("a.png", file.concat());
         assert_eq!(line, format!("PLTE is {palette} bytes, expected 1 to 256 colours of 3 bytes"));
     }
+}
+
+/// Names of no letter take no byte of the file, so 262146 of them passed every check of its size and made 58 MB.
+#[test]
+fn exodus_names_of_no_letter() {
+    let folder = Folder::new();
+    let mut file = exodus().file();
+    for (dim, length) in [(&b"len_string\0\0"[..], 0_u32), (b"num_nod_var\0", 262_146)] {
+        let start = file.windows(dim.len()).position(|window| window == dim).unwrap() + dim.len();
+        file[start..start + 4].copy_from_slice(&length.to_be_bytes());
+    }
+    let line = read_grid(&folder.put("a.ex2", file), &GridOptions::default()).unwrap_err().to_string();
+    let expected = "name_nod_var is 262146 x 0, expected 1 to 65536 names of at least 1 letter";
+    assert!(line.ends_with(expected), "{line}");
 }

@@ -91,8 +91,8 @@ const LIES: &[(&str, &str, &str)] = &[
     ("LittleEndian", "MiddleEndian", "byte_order is 'MiddleEndian', expected LittleEndian or BigEndian"),
     (
         "byte_order",
-        "compressor=\"vtkLZ4DataCompressor\" byte_order",
-        "compressor is 'vtkLZ4DataCompressor', expected",
+        "compressor=\"vtkBrotliDataCompressor\" byte_order",
+        "compressor is 'vtkBrotliDataCompressor', expected",
     ),
     ("byte_order", "header_type=\"UInt8\" byte_order", "header_type is 'UInt8', expected UInt32 or UInt64"),
     ("<VTKFile", "<svg/><VTKFile", "root element is 'svg', expected VTKFile"),

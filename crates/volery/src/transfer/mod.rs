@@ -116,6 +116,14 @@ fn hounsfield(points: &[HounsfieldPoint]) -> Vec<ControlPoint> {
     points.iter().map(|&(value, color, opacity)| ControlPoint { value, color, opacity }).collect()
 }
 
+/// Grey from black to white over a range of values, opacity as well: how planes are shown where nobody says
+/// otherwise.
+pub fn gray([low, high]: [f64; 2], extent: DVec3) -> TransferFunction {
+    let point = |value, level| ControlPoint { value, color: [level; 3], opacity: level };
+    TransferFunction::new(vec![point(low, 0.0), point(high, 1.0)], unit_distance(extent))
+        .expect("a range that rises, and levels in [0, 1]")
+}
+
 /// The world length that opacities of presets refer to: 1/128 of the longest edge of the domain, so that a
 /// picture looks the same whatever the unit of length and the number of samples.
 pub fn unit_distance(extent: DVec3) -> f64 {

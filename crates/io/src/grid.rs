@@ -1,0 +1,285 @@
+//! Reading an unstructured grid: which format a file has, and what every reader is asked and answers.
+//!
+//! # Method
+//! A reader finds what a file offers without reading numbers, as one or several pieces. What is asked for is
+//! then read piece by piece, checked and joined: cells of volume are kept, cells of higher order by their
+//! corner nodes; every other cell, copies of cells in other pieces and hidden cells are counted in the notes.
+//! Points that pieces share become one, so that the grid hangs together where it was cut into pieces.
+//! Values on cells are averaged to the nodes, the mean of the cells around; an array of several components
+//! becomes its magnitude.
+
+use std::fmt;
+use std::io::Read;
+use std::path::Path;
+
+use glam::DVec3;
+use volery_scene::UnstructuredGrid;
+
+use crate::bytes::{self, load};
+use crate::error::{Problem, ReadError, quoted};
+use crate::volume::lower_name;
+
+mod exodus;
+mod join;
+mod kinds;
+mod legacy;
+mod pvtu;
+mod vtu;
+
+/// What the caller wants of a grid.
+#[derive(Clone, Debug)]
+pub struct GridOptions {
+    /// The array to read; else the active scalars, else the first scalar, points before cells.
+    pub array: Option<String>,
+    /// Limit of the grid in memory, in bytes.
+    pub max_bytes: u64,
+}
+
+impl Default for GridOptions {
+    /// The file's own array, at most 64 GiB.
+    fn default() -> Self {
+        Self { array: None, max_bytes: 64 << 30 }
+    }
+}
+
+/// A format of grid files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum GridFormat {
+    /// VTK's XML unstructured grid, `.vtu`.
+    Vtu,
+    /// The same in pieces, each a file of its own, `.pvtu`.
+    Pvtu,
+    /// VTK's legacy format, `.vtk`.
+    LegacyVtk,
+    /// Exodus II in netCDF-3, `.ex2`, `.exo`, `.e`.
+    Exodus,
+}
+
+impl fmt::Display for GridFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Vtu => "VTK unstructured grid",
+            Self::Pvtu => "VTK parallel unstructured grid",
+            Self::LegacyVtk => "legacy VTK unstructured grid",
+            Self::Exodus => "Exodus II",
+        })
+    }
+}
+
+/// What the values of an array belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The nodes.
+    Points,
+    /// The cells.
+    Cells,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Points => "points",
+            Self::Cells => "cells",
+        })
+    }
+}
+
+/// An array that a file offers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridArray {
+    /// Its name.
+    pub name: String,
+    /// What its values belong to.
+    pub place: Place,
+    /// Numbers for each point or cell.
+    pub components: usize,
+    /// Type of a number as stored: `f32`, `i64`, ...
+    pub scalar: &'static str,
+}
+
+/// A grid as read.
+#[derive(Clone, Debug)]
+pub struct GridFile {
+    /// The cells, and the array that was read, at the nodes and under its own name.
+    pub grid: UnstructuredGrid,
+    /// The format of the file.
+    pub format: GridFormat,
+    /// The array that was read; `None` where the file has none.
+    pub array: Option<GridArray>,
+    /// What the reader decided for the user, a sentence each: cells left out, values averaged, and the like.
+    pub notes: Vec<String>,
+}
+
+/// The values of an array, as a file has them: not averaged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArrayRange {
+    /// The array.
+    pub array: GridArray,
+    /// Smallest and largest finite value, of the magnitude where there are several components; `None` if there
+    /// is none.
+    pub range: Option<[f64; 2]>,
+    /// Values that are NaN or infinite.
+    pub blank: u64,
+}
+
+/// Whether [`read_grid`] is the one to read a file: by the ending of its name, else by its first bytes.
+pub fn is_grid(path: &Path) -> bool {
+    format_by_name(path).or_else(|| format_by_content(path)).is_some()
+}
+
+/// Reads a grid from a file.
+///
+/// Large files are mapped into memory while they are read: they must not be changed meanwhile.
+///
+/// # Errors
+/// When the file cannot be read, is damaged, is larger than `options` allow, has no cell of volume, or is of a
+/// kind that is not supported: one line that says what was found and what was expected.
+pub fn read_grid(path: &Path, options: &GridOptions) -> Result<GridFile, ReadError> {
+    with_parts(path, |format, parts| {
+        let (grid, array, notes) = join::join(parts, options)?;
+        Ok(GridFile { grid, format, array, notes })
+    })
+}
+
+/// Looks at the values of every array of a file, one after the other.
+///
+/// # Errors
+/// As [`read_grid`], cells aside.
+pub fn read_array_ranges(path: &Path, options: &GridOptions) -> Result<Vec<ArrayRange>, ReadError> {
+    with_parts(path, |_, parts| join::ranges(parts, options))
+}
+
+/// A grid, or a part of one, whose numbers have not been read yet.
+trait Piece {
+    fn num_points(&self) -> u64;
+    fn num_cells(&self) -> u64;
+    fn arrays(&self) -> &[PieceArray];
+    /// What the reader decided.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+    fn points(&self) -> Result<Vec<DVec3>, Problem>;
+    /// All cells, which may have `max_nodes` nodes together.
+    fn cells(&self, max_nodes: u64) -> Result<PieceCells, Problem>;
+    /// The numbers of an array, the components of a value side by side.
+    fn values(&self, array: usize) -> Result<Vec<f64>, Problem>;
+}
+
+/// An array of a piece.
+struct PieceArray {
+    array: GridArray,
+    /// Whether the file names it as the one to show.
+    is_active: bool,
+}
+
+/// Cells as files have them.
+struct PieceCells {
+    /// VTK's number of each cell's type.
+    types: Vec<u8>,
+    /// For each cell where its nodes end; rising, the last one at most the number of nodes.
+    ends: Vec<usize>,
+    /// The nodes of the cells, each below the number of points.
+    nodes: Vec<u32>,
+}
+
+/// A count from a file, times the numbers for each, as a length in memory.
+fn count(found: u64, each: usize) -> Result<usize, Problem> {
+    let count = usize::try_from(found).ok().and_then(|found| found.checked_mul(each));
+    count.ok_or_else(|| Problem::field("count", found, "one that can be addressed"))
+}
+
+/// Turns the ends of cells in the list of nodes, one after the other, into places.
+fn rising_ends(max_nodes: u64) -> impl FnMut(i64) -> Result<usize, Problem> {
+    let mut last = 0;
+    move |end| match usize::try_from(end) {
+        Ok(place) if place >= last && place as u64 <= max_nodes => {
+            last = place;
+            Ok(place)
+        }
+        _ => Err(Problem::field("end of a cell", end, format!("{last} to {max_nodes}"))),
+    }
+}
+
+/// Turns nodes into indices of points.
+fn node_below(num_points: u64) -> impl FnMut(i64) -> Result<u32, Problem> {
+    move |node| match u32::try_from(node) {
+        Ok(index) if u64::from(index) < num_points => Ok(index),
+        _ => Err(Problem::field("node", node, format!("0 or more and below {num_points}"))),
+    }
+}
+
+/// Turns a number into one of VTK's types of cell.
+fn vtk_type(number: i64) -> Result<u8, Problem> {
+    u8::try_from(number).map_err(|_| Problem::field("type of a cell", number, "0 to 255"))
+}
+
+/// A piece and, if it is not the file asked for, the file that it is in.
+struct Part<'a> {
+    path: Option<&'a Path>,
+    piece: Box<dyn Piece + 'a>,
+}
+
+impl Part<'_> {
+    /// Runs something on the piece; what goes wrong names the file.
+    fn run<R>(&self, run: impl FnOnce(&dyn Piece) -> Result<R, Problem>) -> Result<R, Problem> {
+        let named = |problem: Problem| match self.path {
+            Some(path) => problem.of_part(path),
+            None => problem,
+        };
+        run(&*self.piece).map_err(named)
+    }
+}
+
+/// Opens a file and runs something on its parts.
+fn with_parts<R>(
+    path: &Path,
+    run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
+) -> Result<R, ReadError> {
+    let read = || {
+        // A file that cannot be opened is to say so, whatever its name is.
+        bytes::open(path)?;
+        let expected = "one that ends in .vtu, .pvtu, .vtk, .ex2, .exo or .e";
+        let format = format_by_content(path).or_else(|| format_by_name(path));
+        let format = format.ok_or_else(|| Problem::field("file name", quoted(lower_name(path)), expected))?;
+        match format {
+            GridFormat::Vtu => vtu::with_parts(&load(path)?, |parts| run(format, parts)),
+            GridFormat::Pvtu => pvtu::with_parts(path, |parts| run(format, parts)),
+            GridFormat::LegacyVtk => legacy::with_parts(&load(path)?, |parts| run(format, parts)),
+            GridFormat::Exodus => exodus::with_parts(&load(path)?, |parts| run(format, parts)),
+        }
+    };
+    read().map_err(|problem| ReadError { path: path.to_owned(), problem })
+}
+
+fn format_by_name(path: &Path) -> Option<GridFormat> {
+    let name = lower_name(path);
+    let endings = [
+        (".vtu", GridFormat::Vtu),
+        (".pvtu", GridFormat::Pvtu),
+        (".vtk", GridFormat::LegacyVtk),
+        (".ex2", GridFormat::Exodus),
+        (".exo", GridFormat::Exodus),
+        (".e", GridFormat::Exodus),
+    ];
+    endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, format)| format)
+}
+
+/// The format that the first bytes of a file prove.
+fn format_by_content(path: &Path) -> Option<GridFormat> {
+    let mut head = Vec::new();
+    bytes::open(path).ok()?.0.take(512).read_to_end(&mut head).ok()?;
+    let head = String::from_utf8_lossy(&head);
+    let root = head.find("<VTKFile").map(|start| &head[start..]);
+    let root = root.map(|root| root.split('>').next().unwrap_or_default());
+    let is_type = |name: &str| root.is_some_and(|root| root.contains(&format!("\"{name}\"")));
+    if is_type("UnstructuredGrid") {
+        Some(GridFormat::Vtu)
+    } else if is_type("PUnstructuredGrid") {
+        Some(GridFormat::Pvtu)
+    } else if head.starts_with("# vtk DataFile") {
+        Some(GridFormat::LegacyVtk)
+    } else {
+        None
+    }
+}

@@ -1,0 +1,53 @@
+//! VTK's parallel unstructured grid, `.pvtu`: names files of pieces, relative to its own folder.
+
+use std::path::{Path, PathBuf};
+
+use super::{Part, vtu};
+use crate::bytes::{FileBytes, load};
+use crate::error::Problem;
+use crate::vtk_xml::Document;
+
+/// A grid of more pieces is refused: all of them are in memory or mapped at once.
+const MAX_PIECES: usize = 4096;
+
+/// Opens a file and those that it names, and runs something on all pieces.
+pub(super) fn with_parts<R>(
+    path: &Path,
+    run: impl FnOnce(&[Part]) -> Result<R, Problem>,
+) -> Result<R, Problem> {
+    let paths = piece_paths(path)?;
+    let of_part = |path: &PathBuf, problem: Problem| problem.of_part(path);
+    let files: Vec<FileBytes> = paths
+        .iter()
+        .map(|path| load(path).map_err(|problem| of_part(path, problem)))
+        .collect::<Result<_, _>>()?;
+    let documents: Vec<Document> = paths
+        .iter()
+        .zip(&files)
+        .map(|(path, file)| {
+            Document::parse(file, "UnstructuredGrid").map_err(|problem| of_part(path, problem))
+        })
+        .collect::<Result<_, _>>()?;
+    let mut parts = Vec::new();
+    for (path, document) in paths.iter().zip(&documents) {
+        let pieces = vtu::pieces(document).map_err(|problem| of_part(path, problem))?;
+        parts.extend(pieces.into_iter().map(|piece| Part { path: Some(path), piece: Box::new(piece) }));
+    }
+    run(&parts)
+}
+
+fn piece_paths(path: &Path) -> Result<Vec<PathBuf>, Problem> {
+    let bytes = load(path)?;
+    let document = Document::parse(&bytes, "PUnstructuredGrid")?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let source = |piece: &crate::vtk_xml::Element| {
+        let source = piece.attribute("Source")?;
+        source.map(|name| folder.join(name)).ok_or_else(|| Problem::missing("Source", "one for each Piece"))
+    };
+    let paths: Vec<_> = document.all("Piece").map(source).collect::<Result<_, _>>()?;
+    match paths.len() {
+        0 => Err(Problem::missing("Piece", "at least one")),
+        1..=MAX_PIECES => Ok(paths),
+        found => Err(Problem::field("number of pieces", found, format!("at most {MAX_PIECES}"))),
+    }
+}

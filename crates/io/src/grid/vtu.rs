@@ -1,0 +1,156 @@
+//! VTK's XML unstructured grid, `.vtu`: one or several pieces; arrays as in every VTK XML file.
+
+use glam::DVec3;
+
+use super::{GridArray, Part, Piece, PieceArray, PieceCells, Place};
+use crate::error::Problem;
+use crate::numbers::{Numbers, Scalar};
+use crate::vtk_xml::{Document, Element};
+
+/// One `Piece`.
+pub(super) struct VtuPiece<'a> {
+    document: &'a Document<'a>,
+    element: &'a Element<'a>,
+    num_points: u64,
+    num_cells: u64,
+    arrays: Vec<PieceArray>,
+    /// The elements of the arrays, and the type of their numbers.
+    elements: Vec<(&'a Element<'a>, Scalar)>,
+}
+
+/// Opens the content of a file and runs something on its pieces.
+pub(super) fn with_parts<R>(
+    bytes: &[u8],
+    run: impl FnOnce(&[Part]) -> Result<R, Problem>,
+) -> Result<R, Problem> {
+    let document = Document::parse(bytes, "UnstructuredGrid")?;
+    let pieces = pieces(&document)?.into_iter();
+    let parts: Vec<_> = pieces.map(|piece| Part { path: None, piece: Box::new(piece) }).collect();
+    run(&parts)
+}
+
+/// The pieces of a file, at least one.
+pub(super) fn pieces<'a>(document: &'a Document<'a>) -> Result<Vec<VtuPiece<'a>>, Problem> {
+    let pieces: Vec<_> =
+        document.all("Piece").map(|element| VtuPiece::new(document, element)).collect::<Result<_, _>>()?;
+    if pieces.is_empty() {
+        return Err(Problem::missing("Piece", "at least one"));
+    }
+    Ok(pieces)
+}
+
+impl<'a> VtuPiece<'a> {
+    fn new(document: &'a Document<'a>, element: &'a Element<'a>) -> Result<Self, Problem> {
+        let count = |name: &str| {
+            element.number(name)?.ok_or_else(|| Problem::missing(name, "a whole number for each piece"))
+        };
+        let (num_points, num_cells) = (count("NumberOfPoints")?, count("NumberOfCells")?);
+        let mut piece =
+            Self { document, element, num_points, num_cells, arrays: Vec::new(), elements: Vec::new() };
+        for (section, place) in [("PointData", Place::Points), ("CellData", Place::Cells)] {
+            for section in document.children(element, section) {
+                piece.add_arrays(section, place)?;
+            }
+        }
+        Ok(piece)
+    }
+
+    /// Adds the arrays of a section that hold numbers; others, such as strings, are none that could be drawn.
+    fn add_arrays(&mut self, section: &'a Element<'a>, place: Place) -> Result<(), Problem> {
+        let active = section.attribute("Scalars")?;
+        for element in self.document.children(section, "DataArray") {
+            let name = element.attribute("Name")?.unwrap_or_default();
+            let scalar = element.scalar().map_err(|problem| problem.of_array(&name))?;
+            let components = element.number("NumberOfComponents")?.unwrap_or(1);
+            let components = usize::try_from(components).ok().filter(|&components| components > 0);
+            let components = components
+                .ok_or_else(|| Problem::field("NumberOfComponents", "0", "at least 1").of_array(&name))?;
+            let is_active = active.as_deref() == Some(name.as_str());
+            let array = GridArray { name, place, components, scalar: scalar.name() };
+            self.arrays.push(PieceArray { array, is_active });
+            self.elements.push((element, scalar));
+        }
+        Ok(())
+    }
+
+    /// The array of a name in a section of one piece, such as `offsets` in `Cells`; of any name if none is said.
+    fn topology(&self, section: &str, name: Option<&str>) -> Result<&'a Element<'a>, Problem> {
+        let section_element = self.document.children(self.element, section).next();
+        for array in section_element.into_iter().flat_map(|found| self.document.children(found, "DataArray"))
+        {
+            if name.is_none() || array.attribute("Name")?.as_deref() == name {
+                return Ok(array);
+            }
+        }
+        Err(Problem::missing(name.unwrap_or(section), format!("a DataArray in {section}")))
+    }
+
+    fn open(&self, element: &Element<'a>, scalar: Scalar, count: usize) -> Result<Numbers<'a>, Problem> {
+        // A count that overflows is no length that a file could have.
+        let bytes = (count as u64).saturating_mul(scalar.bytes());
+        self.document.numbers(element, bytes)
+    }
+
+    /// Whole numbers that describe cells.
+    fn wholes<U>(
+        &self,
+        name: &str,
+        count: usize,
+        convert: impl FnMut(i64) -> Result<U, Problem>,
+    ) -> Result<Vec<U>, Problem> {
+        let element = self.topology("Cells", Some(name))?;
+        let read = || {
+            let scalar = element.scalar()?;
+            self.open(element, scalar, count)?.wholes(scalar, count, convert)
+        };
+        read().map_err(|problem| problem.of_array(name))
+    }
+}
+
+impl Piece for VtuPiece<'_> {
+    fn num_points(&self) -> u64 {
+        self.num_points
+    }
+
+    fn num_cells(&self) -> u64 {
+        self.num_cells
+    }
+
+    fn arrays(&self) -> &[PieceArray] {
+        &self.arrays
+    }
+
+    fn points(&self) -> Result<Vec<DVec3>, Problem> {
+        let element = self.topology("Points", None)?;
+        let read = || {
+            let components = element.number("NumberOfComponents")?;
+            if components != Some(3) {
+                let found = components.map_or("missing".to_owned(), |found| found.to_string());
+                return Err(Problem::field("NumberOfComponents", found, 3));
+            }
+            let (scalar, count) = (element.scalar()?, super::count(self.num_points, 3)?);
+            let numbers = self.open(element, scalar, count)?.reals(scalar, count)?;
+            Ok(numbers.as_chunks::<3>().0.iter().copied().map(DVec3::from_array).collect())
+        };
+        read().map_err(|problem| problem.of_array("Points"))
+    }
+
+    fn cells(&self, max_nodes: u64) -> Result<PieceCells, Problem> {
+        let num_cells = super::count(self.num_cells, 1)?;
+        let ends = self.wholes("offsets", num_cells, super::rising_ends(max_nodes))?;
+        let num_nodes = ends.last().copied().unwrap_or(0);
+        let nodes = self.wholes("connectivity", num_nodes, super::node_below(self.num_points))?;
+        Ok(PieceCells { types: self.wholes("types", num_cells, super::vtk_type)?, ends, nodes })
+    }
+
+    fn values(&self, array: usize) -> Result<Vec<f64>, Problem> {
+        let GridArray { name, place, components, .. } = &self.arrays[array].array;
+        let tuples = if *place == Place::Points { self.num_points } else { self.num_cells };
+        let (element, scalar) = self.elements[array];
+        let read = || {
+            let count = super::count(tuples, *components)?;
+            self.open(element, scalar, count)?.reals(scalar, count)
+        };
+        read().map_err(|problem| problem.of_array(name))
+    }
+}

@@ -1,0 +1,9 @@
+//! Sections against the slow way, cell by cell and grid by grid.
+
+#![allow(clippy::unwrap_used, reason = "what cannot be set up has failed")]
+
+mod adaptive;
+mod cells;
+mod grids;
+mod hard;
+mod support;

@@ -1,0 +1,137 @@
+//! What can go wrong in a session.
+
+use volery_frame::planes::MAX_PLANES;
+use volery_frame::{DrawError, UploadError};
+use volery_scene::{SampleType, camera, plane};
+
+use super::Focus;
+use crate::technique::residency;
+
+/// Why a volume cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// Samples that are colours.
+    #[error(
+        "{technique}: samples are {found}, expected one channel of numbers (technique plane draws colours)"
+    )]
+    Colors {
+        /// Name of the technique.
+        technique: &'static str,
+        /// Type of the samples.
+        found: SampleType,
+    },
+    /// An axis along which there is nothing to integrate.
+    #[error("{technique}: {} x {} x {} samples, expected at least 2 along each axis (technique plane draws images)", .dims[0], .dims[1], .dims[2])]
+    Flat {
+        /// Name of the technique.
+        technique: &'static str,
+        /// Samples along x, y, z.
+        dims: [usize; 3],
+    },
+    /// An axis that is longer than cubes can be numbered.
+    #[error("fans: {} x {} x {} samples, expected at most {max} along each axis", .dims[0], .dims[1], .dims[2])]
+    TooLong {
+        /// Samples along x, y, z.
+        dims: [usize; 3],
+        /// Most along an axis.
+        max: usize,
+    },
+    /// Every sample is NaN or infinite.
+    #[error("every sample is blank, expected some finite values")]
+    Blank,
+    /// Values so far apart that their difference is no number.
+    #[error("values from {:e} to {:e}, expected a range below 1.8e308", .range[0], .range[1])]
+    TooWide {
+        /// Smallest and largest value.
+        range: [f64; 2],
+    },
+    /// The pyramid cannot be built.
+    #[error("pyramid: {0}")]
+    Layout(#[from] volery_pyramid::layout::Error),
+    /// The backend cannot hold bricks of this volume.
+    #[error(transparent)]
+    Backend(#[from] UploadError),
+}
+
+/// Why a picture could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The camera cannot take a picture.
+    #[error(transparent)]
+    Camera(#[from] camera::Defect),
+    /// A tolerance that is no fraction of the range.
+    #[error("tolerance is {found}, expected a number of at least 0")]
+    Tolerance {
+        /// As given.
+        found: f64,
+    },
+    /// A background that is no colour.
+    #[error("background is {found:?}, expected three numbers in [0, 1]")]
+    Background {
+        /// As given.
+        found: [f64; 3],
+    },
+    /// A picture without pixels.
+    #[error("picture of {width}x{height} pixels, expected at least 1x1")]
+    Empty {
+        /// Pixels from left to right.
+        width: u32,
+        /// Pixels from top to bottom.
+        height: u32,
+    },
+    /// A plane that is none.
+    #[error("plane {index}: {defect}")]
+    Plane {
+        /// Which of the view's planes.
+        index: usize,
+        /// What is wrong with it.
+        defect: plane::Defect,
+    },
+    /// No plane to draw, or too many.
+    #[error("{found} planes, expected 1 to {MAX_PLANES}")]
+    NumPlanes {
+        /// As given.
+        found: usize,
+    },
+    /// A focus that is no place, or a quality that is no number.
+    #[error("focus {} of quality {}, expected finite coordinates and a quality of at least 0", .found.point, .found.quality)]
+    Focus {
+        /// As given.
+        found: Focus,
+    },
+    /// A largest error that is no difference of colours.
+    #[error("error is {found}, expected a number from 0 to 1")]
+    MaxError {
+        /// As given.
+        found: f64,
+    },
+    /// A technique whose pictures are made at once.
+    #[error("progressive: technique {technique}, expected plane")]
+    NotProgressive {
+        /// Its name.
+        technique: &'static str,
+    },
+    /// No frame was asked for.
+    #[error("0 frames, expected at least 1")]
+    NoFrame,
+    /// Bricks could not be made resident.
+    #[error(transparent)]
+    Bricks(#[from] residency::Error),
+    /// The backend could not draw.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+}
+
+/// Why a picture could not be compared with the truth.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The truth could not be computed.
+    #[error("reference: {0}")]
+    Reference(#[from] volery_reference::Error),
+    /// The picture has not as many pixels as it says.
+    #[error(transparent)]
+    Pixels(#[from] volery_reference::SizeMismatch),
+    /// The picture is of another size than the view.
+    #[error(transparent)]
+    Size(#[from] volery_reference::metrics::Error),
+}

@@ -1,0 +1,122 @@
+//! Which bricks are resident, and how the others get there.
+//!
+//! Bricks are read in parallel into a fixed number of buffers: [`BATCH_BYTES`] is all that uploading needs beside
+//! what the backend keeps. Where the backend's memory is full, it forgets what this frame does not need.
+
+use rayon::prelude::*;
+use volery_frame::{Backend, BrickId, PlacedBrick, UploadError, VolumeLayout};
+use volery_pyramid::{Brick, Layout, Node, NodeSource, ReadError};
+
+use crate::texels::{Buffer, Encoding};
+
+/// Texels on their way to the backend at one time.
+pub const BATCH_BYTES: usize = 16 << 20;
+
+/// What uploading moved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Uploaded {
+    /// Bricks.
+    pub bricks: usize,
+    /// Bytes of texels.
+    pub bytes: u64,
+}
+
+impl std::ops::AddAssign for Uploaded {
+    fn add_assign(&mut self, other: Self) {
+        self.bricks += other.bricks;
+        self.bytes += other.bytes;
+    }
+}
+
+/// Why bricks could not be made resident.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A brick could not be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The backend refused.
+    #[error(transparent)]
+    Upload(#[from] UploadError),
+}
+
+/// Makes the bricks of these nodes resident, those that are not.
+pub(crate) fn upload(
+    source: &dyn NodeSource,
+    encoding: &Encoding,
+    volume: &VolumeLayout,
+    nodes: &[Node],
+    backend: &mut dyn Backend,
+) -> Result<Uploaded, Error> {
+    match upload_missing(source, encoding, nodes, backend) {
+        Err(Error::Upload(UploadError::PoolFull { .. })) => {
+            backend.set_volume(volume)?;
+            upload_missing(source, encoding, nodes, backend)
+        }
+        other => other,
+    }
+}
+
+fn upload_missing(
+    source: &dyn NodeSource,
+    encoding: &Encoding,
+    nodes: &[Node],
+    backend: &mut dyn Backend,
+) -> Result<Uploaded, Error> {
+    let numbers = Numbers::of(source.layout());
+    let missing: Vec<(Node, BrickId)> = nodes
+        .iter()
+        .map(|&node| (node, numbers.id(source.layout(), node)))
+        .filter(|&(_, id)| !backend.is_resident(id))
+        .collect();
+    let samples = (source.layout().brick_cells() + 1).pow(3);
+    let bytes_per_slot = samples * encoding.texel.bytes().max(source.sample_type().bytes());
+    let num_slots = (BATCH_BYTES / bytes_per_slot).clamp(1, missing.len().max(1));
+    let new_slot = || (Brick::empty(source.sample_type()), Buffer::default());
+    let mut slots: Vec<_> = std::iter::repeat_with(new_slot).take(num_slots).collect();
+    let mut uploaded = Uploaded::default();
+    for batch in missing.chunks(num_slots) {
+        let ready = batch
+            .par_iter()
+            .zip(&mut slots)
+            .map(|(&(node, id), (brick, buffer))| {
+                source.read_brick(node, brick)?;
+                // At most brick_cells + 1 samples, which fits.
+                let samples = brick.shape.count.map(|n| n as u32);
+                Ok(volery_frame::Brick { id, samples, texels: encoding.encode(&brick.samples, buffer) })
+            })
+            .collect::<Result<Vec<_>, ReadError>>()?;
+        backend.upload(&ready)?;
+        uploaded.bricks += ready.len();
+        uploaded.bytes += ready.iter().map(|b| (b.texels.len() * encoding.texel.bytes()) as u64).sum::<u64>();
+    }
+    Ok(uploaded)
+}
+
+/// Numbers the nodes of a tree: those of level 0 first, each level x fastest.
+pub(crate) struct Numbers {
+    first_of_level: Vec<u64>,
+}
+
+impl Numbers {
+    pub(crate) fn of(layout: &Layout) -> Self {
+        let mut next = 0;
+        let first_of_level = (0..layout.num_levels())
+            .map(|level| {
+                let first = next;
+                next += layout.num_nodes(level) as u64;
+                first
+            })
+            .collect();
+        Self { first_of_level }
+    }
+
+    pub(crate) fn id(&self, layout: &Layout, node: Node) -> BrickId {
+        BrickId(self.first_of_level[node.level as usize] + layout.node_index(node) as u64)
+    }
+
+    pub(crate) fn place(&self, layout: &Layout, node: Node) -> PlacedBrick {
+        // A layout's axes are below 2^31 samples, so a node's first cell fits.
+        let size = (layout.brick_cells() as u32) << node.level;
+        PlacedBrick { id: self.id(layout, node), first_cell: node.index.map(|i| i * size), level: node.level }
+    }
+}

@@ -1,0 +1,29 @@
+// Copies a tile that was rendered to its place in a band of the picture.
+
+struct Tile {
+    // Its first pixel in the band, and its pixels.
+    origin: vec2u,
+    size: vec2u,
+    // Pixels from left to right of the band.
+    band_width: u32,
+}
+
+// Pixels per side of a workgroup.
+const GROUP: u32 = 8;
+
+@group(0) @binding(0) var<uniform> tile: Tile;
+@group(0) @binding(1) var rendered: texture_2d<f32>;
+@group(0) @binding(2) var<storage, read_write> picture: array<f32>;
+
+@compute @workgroup_size(GROUP, GROUP)
+fn main(@builtin(global_invocation_id) pixel: vec3u) {
+    if any(pixel.xy >= tile.size) {
+        return;
+    }
+    let color = textureLoad(rendered, pixel.xy, 0);
+    let place = tile.origin + pixel.xy;
+    let index = 3u * (place.y * tile.band_width + place.x);
+    picture[index] = color.r;
+    picture[index + 1u] = color.g;
+    picture[index + 2u] = color.b;
+}
