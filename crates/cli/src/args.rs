@@ -70,6 +70,10 @@ pub(crate) struct RenderArgs {
     /// Largest difference of a value from the full resolution, as a fraction of the file's value range
     #[arg(long, value_name = "T", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
+    /// Write pictures on the way to the last one into this folder, each with its report: of planes each time that
+    /// more of the data has arrived, else coarse ones first
+    #[arg(long, value_name = "DIR")]
+    pub(crate) progressive: Option<PathBuf>,
     /// How the length of a ray in a cube is found (technique fans)
     #[arg(long, value_enum, default_value_t = ThicknessName::Exact)]
     pub(crate) thickness: ThicknessName,
@@ -123,9 +127,6 @@ pub(crate) struct PlaneArgs {
     /// Outline the nodes of the cut in the colour of their level: black, red, green, yellow, ...
     #[arg(long)]
     pub(crate) show_nodes: bool,
-    /// Write a picture and its report into this folder each time that more of the data has arrived
-    #[arg(long, value_name = "DIR")]
-    pub(crate) progressive: Option<PathBuf>,
 }
 
 /// `volery info`

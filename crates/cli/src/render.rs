@@ -8,8 +8,8 @@ use volery::io::transfer::TransferOptions;
 use volery::io::{read_transfer, write_atomically};
 use volery::output::{ErrorMap, write_image};
 use volery::{
-    Focus, Input, Picture, PlaneView, Report, Sampling, Session, TransferFunction, View, ViewOptions,
-    open_backend, read_input,
+    Focus, Input, Picture, PlaneView, RenderError, Report, Sampling, Session, Step, TransferFunction, View,
+    ViewOptions, open_backend, read_input,
 };
 
 use crate::args::{PlaneArgs, RenderArgs, Technique, Transfer};
@@ -38,7 +38,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         Session::open(grid.clone(), backend, technique).map_err(of_file)?
     };
     let view = view(args, &input, &session)?;
-    if let Some(folder) = &args.planes.progressive {
+    if let Some(folder) = &args.progressive {
         progressive(folder, &mut session, &view, &input)?;
     }
     let mut picture = {
@@ -107,21 +107,24 @@ fn planes(args: &PlaneArgs) -> PlaneView {
 fn progressive(folder: &Path, session: &mut Session, view: &View, input: &Input) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure(format!("{}: cannot be made: {error}", folder.display())))?;
-    let num_bricks = session.progressive(view, None, 1)?.num_bricks();
-    let steps = session.progressive(view, None, num_bricks.div_ceil(PROGRESSIVE_STEPS))?;
+    let steps: Box<dyn Iterator<Item = Result<Step, RenderError>>> = match session.technique() {
+        volery::Technique::Plane => {
+            let num_bricks = session.progressive(view, None, 1)?.num_bricks();
+            Box::new(session.progressive(view, None, num_bricks.div_ceil(PROGRESSIVE_STEPS))?)
+        }
+        _ => Box::new(session.refinements(view)?),
+    };
     for (number, step) in steps.enumerate() {
         let Picture { image, mut report } = step?.picture;
         report.input.path = Some(input.path.to_string_lossy().into_owned());
         let path = folder.join(format!("{number:02}.png"));
         write_image(&path, &image)?;
         write_report(&path.with_extension("json"), &report)?;
-        say(format_args!(
-            "{}: {} nodes, {} bricks more, colours within {:.4}",
-            path.display(),
-            report.work.nodes,
-            report.work.bricks,
-            report.error.and_then(|error| error.bound_max).unwrap_or_default(),
-        ))?;
+        let bound = report.error.and_then(|error| error.bound_max);
+        let bound =
+            bound.map_or_else(String::new, |bound| format!(", no colour off by more than {bound:.4}"));
+        let milliseconds = 1e3 * report.seconds.frame;
+        say(format_args!("{}: {milliseconds:.1} ms, {} nodes{bound}", path.display(), report.work.nodes))?;
     }
     Ok(())
 }

@@ -38,8 +38,8 @@ pub use info::{GridInfo, Info};
 pub use input::{Input, InputError, read_input};
 pub use report::Report;
 pub use session::{
-    BACKGROUND, Focus, OpenError, Picture, PlaneView, Progressive, RenderError, Session, Step, VerifyError,
-    View, ViewOptions,
+    BACKGROUND, Focus, OpenError, Picture, PlaneView, Progressive, Refinements, RenderError, Session, Step,
+    VerifyError, View, ViewOptions,
 };
 pub use technique::Technique;
 pub use transfer::{ColorMap, Preset};

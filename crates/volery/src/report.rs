@@ -103,6 +103,9 @@ pub struct Work {
     /// Polygons in which planes cut the nodes drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polygons: Option<usize>,
+    /// Triangles of the fans of the cubes drawn, whichever way the backend takes to draw them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub triangles: Option<usize>,
 }
 
 /// The dials that were turned.

@@ -6,6 +6,7 @@
 
 mod error;
 mod progressive;
+mod refine;
 mod reporting;
 mod view;
 
@@ -31,6 +32,7 @@ use crate::transfer::{self, Preset};
 
 pub use error::{OpenError, RenderError, VerifyError};
 pub use progressive::{Progressive, Step};
+pub use refine::Refinements;
 pub use view::{BACKGROUND, Focus, PlaneView, View, ViewOptions};
 
 /// A picture and its report.

@@ -230,3 +230,22 @@ fn uploads_come_in_batches_of_bounded_size() {
     assert!(largest <= volery::technique::residency::BATCH_BYTES, "{largest}");
     assert!(work.bytes_uploaded > largest as u64, "more than one batch");
 }
+
+#[test]
+fn refinements_come_coarse_first_and_end_with_the_picture_itself() {
+    for technique in [Technique::Raycast, Technique::Fans] {
+        for tolerance in [None, Some(0.0), Some(0.1), Some(0.9)] {
+            let grid = volery_data::marschner_lobb_u8(40);
+            let mut session = Session::open(grid, software(), technique).unwrap();
+            let view = View { tolerance, ..session.view(&small()) };
+            let steps: Vec<_> = session.refinements(&view).unwrap().map(Result::unwrap).collect();
+            let expected = session.render(&view).unwrap();
+            let (last, before) = steps.split_last().unwrap();
+            assert!(last.is_last && last.picture.image == expected.image, "{technique:?} {tolerance:?}");
+            assert!(before.iter().all(|step| !step.is_last));
+            let nodes: Vec<_> = steps.iter().map(|step| step.picture.report.work.nodes).collect();
+            assert!(nodes.is_sorted(), "{technique:?} {tolerance:?}: {nodes:?}");
+            assert_eq!(steps.len() > 1, tolerance != Some(0.9), "{technique:?} {tolerance:?}: {nodes:?}");
+        }
+    }
+}

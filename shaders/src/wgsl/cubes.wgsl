@@ -75,6 +75,7 @@ struct Vertex {
     // Of the way from the eye to the exit: the part before the cube and the part in it. Then the entry's way from
     // the plane where parallel rays start.
     @location(0) shares: vec3f,
+    // Below zero if the eye is in the cube: its faces reach behind the eye, where nothing is linear on the screen.
     @location(1) @interpolate(linear) thickness: f32,
     // Colour and extinction.
     @location(2) @interpolate(flat) matter: vec4f,
@@ -109,6 +110,8 @@ struct Place {
     point: vec3f,
     before: f32,
     through: f32,
+    // Whether the eye is in the cube.
+    is_inside: bool,
 }
 
 fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
@@ -135,10 +138,10 @@ fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
     let plane = select(low_plane, high_plane, is_high_end);
     let end = (vec3f(plane - frame.anchor_whole) - frame.anchor_fraction) * frame.step;
     if !is_outside {
-        return Place(end, 1.0, 1.0);
+        return Place(end, 1.0, 1.0, true);
     }
     if !is_inner {
-        return Place(end, 1.0, 0.0);
+        return Place(end, 1.0, 0.0, false);
     }
     let before = near[first] / far[first];
     let through = size[first] / far[first];
@@ -149,7 +152,7 @@ fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
     let from_afar = end + clamp(-through * end_seen, least, most);
     let from_nearby = clamp(before * end_seen, low, high) - frame.anchor_from_eye;
     let drawn = select(from_afar, from_nearby, through > 0.5 && !is_parallel);
-    return Place(select(drawn, end, is_first), before, through);
+    return Place(select(drawn, end, is_first), before, through, false);
 }
 
 @vertex
@@ -171,7 +174,7 @@ fn fan(@builtin(vertex_index) vertex: u32, @builtin(instance_index) batch: u32) 
     out.position = vec4f(dot(frame.clip_x, position), dot(frame.clip_y, position), 0.5 * w, w);
     out.shares = vec3f(place.before, place.through, dot(frame.depth, position));
     let reach = select(length(place.point + frame.anchor_from_eye), 1.0, frame.is_parallel != 0u);
-    out.thickness = reach * place.through / place.before;
+    out.thickness = select(reach * place.through / place.before, -1.0, place.is_inside);
     let extinction = min(min(cube.extinction, MAX_EXTINCTION) * frame.unit_length, MAX_EXTINCTION);
     out.matter = vec4f(cube.red, cube.green, cube.blue, extinction);
     return out;
@@ -187,7 +190,7 @@ fn opacity_of(depth: f32) -> f32 {
 @fragment
 fn matter(in: Vertex) -> @location(0) vec4f {
     var thickness = in.thickness;
-    if IS_EXACT {
+    if IS_EXACT || thickness < 0.0 {
         // Of a ray, length per depth; depth is one over `w`.
         let slope = (in.position.xy - frame.center) * frame.slope_per_pixel;
         let length_per_depth = sqrt(1.0 + dot(slope, slope));

@@ -23,6 +23,7 @@ macro_rules! by_both_backends {
 
 mod compositing;
 mod convergence;
+mod fans;
 mod files;
 mod grids;
 mod opacity;

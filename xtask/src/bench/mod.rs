@@ -1,7 +1,7 @@
 //! `cargo xtask bench`: criterion benches of all crates, Volery beside VTK, and the tables of documents.
 
+mod documents;
 mod peers;
-mod planes;
 mod reslice;
 mod table;
 mod volery;
@@ -28,7 +28,9 @@ enum Which {
     /// VTK and Volery in turn on the same scenes: time against error.
     Peers(peers::Options),
     /// Multiresolution planes: bytes and time against error, and the pictures of docs/planes.md.
-    Planes(planes::Options),
+    Planes(documents::Options),
+    /// Cubes as fans: time against error beside rays, and the picture of docs/fans.md.
+    Fans(documents::Options),
 }
 
 /// Runs the benches asked for.
@@ -38,7 +40,8 @@ enum Which {
 pub(crate) fn run(options: &Options) -> Result<(), String> {
     match &options.which {
         Some(Which::Peers(options)) => peers::run(options),
-        Some(Which::Planes(options)) => planes::run(options),
+        Some(Which::Planes(options)) => documents::run(options, "planes", "plane_tables"),
+        Some(Which::Fans(options)) => documents::run(options, "fans", "fans_tables"),
         None => criterion(options.filter.as_deref()),
     }
 }

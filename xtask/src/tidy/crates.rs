@@ -29,11 +29,7 @@ const GRAPH: [Rule; 15] = [
     rule("volery-frame", "crates/frame", &["volery-scene"]),
     rule("volery-software", "crates/software", &["volery-scene", "volery-frame", "volery-cubefan"]),
     rule("volery-shaders", "shaders", &[]),
-    rule(
-        "volery-wgpu",
-        "crates/wgpu",
-        &["volery-scene", "volery-cubefan", "volery-frame", "volery-shaders"],
-    ),
+    rule("volery-wgpu", "crates/wgpu", &["volery-scene", "volery-cubefan", "volery-frame", "volery-shaders"]),
     rule("volery-reference", "crates/reference", &["volery-scene"]),
     rule("volery-io", "crates/io", &["volery-scene"]),
     rule(

@@ -5,8 +5,8 @@
 //! field that the bricks were cut from (`oracle::march`), midpoint rule, many steps per cell. The
 //! marcher shares nothing with a backend but the camera's rays and the transfer function. Cutting planes are
 //! compared with a search through all bricks for every pixel (`plane_oracle`); where that picture jumps within a
-//! few thousandths of a pixel either side is right, and such pixels are counted. Every check prints its threshold
-//! beside the value that it measured.
+//! few thousandths of a pixel either side is right, and such pixels are counted. Cubes are compared with their chords.
+//! Every check prints its threshold beside the value that it measured.
 //!
 //! # What a backend may do
 //! - Stop a ray once it lets through less than [`STOP_TRANSMITTANCE`] of the light; thresholds allow for it.
@@ -22,6 +22,7 @@
 #![allow(clippy::missing_panics_doc, reason = "every property panics where it does not hold")]
 
 mod compositing;
+mod cubes;
 mod levels;
 mod matter;
 mod oracle;
@@ -152,6 +153,16 @@ properties! { $
         few_bricks_in_a_large_volume
         planes_and_rays_in_turn
         wrong_frames_of_planes_are_named;
+    cubes:
+        one_cube_is_its_chords
+        cubes_around_the_eye
+        cubes_out_of_sight
+        cubes_of_all_extinctions
+        fields_of_cubes_are_their_integrals
+        cubes_of_all_spacings
+        interpolated_lengths_of_parallel_rays_are_exact
+        interpolated_lengths_are_linear_on_the_screen
+        rays_in_shared_faces_count_once;
 }
 
 #[cfg(test)]
@@ -168,6 +179,7 @@ mod tests {
             include_str!("order.rs"),
             include_str!("requests.rs"),
             include_str!("planes.rs"),
+            include_str!("cubes.rs"),
         ];
         let written = sources.iter().flat_map(|text| text.lines());
         let written: Vec<_> = written.filter(|line| line.starts_with("pub fn ")).collect();

@@ -56,6 +56,10 @@ impl Session {
                 bytes_resident: self.backend.resident_bytes(),
                 bytes_uploaded: uploaded.bytes,
                 polygons: planes.map(|plan| plan.num_polygons),
+                triangles: match plan {
+                    Plan::Cubes(plan) => Some(plan.num_triangles(&self.volume, &view.camera)),
+                    Plan::Rays(_) | Plan::Planes(_) => None,
+                },
             },
             dial: (dial != report::Dial::default()).then_some(dial),
             error: planes.map(|plan| report::Error { bound_max: Some(plan.bound_max), measured: None }),

@@ -24,10 +24,10 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_frame::Cube;
+use volery_frame::{Cube, VolumeLayout};
 use volery_octree::{Frustum, Viewpoint};
 use volery_pyramid::{CubeTree, Layout};
-use volery_scene::{Sample, VoxelGrid, for_samples};
+use volery_scene::{Camera, Projection, Sample, VoxelGrid, for_samples};
 
 use crate::session::View;
 
@@ -48,6 +48,28 @@ pub struct Plan {
     pub cubes: Vec<Cube>,
     /// How many of each level, the finest first, up to the coarsest that has one.
     pub cubes_by_level: Vec<usize>,
+}
+
+impl Plan {
+    /// How many triangles the fans of the cubes have: ten for a cube of which one face is toward the eye, else twelve
+    /// (`volery_cubefan::Fans::triangles`).
+    pub fn num_triangles(&self, layout: &VolumeLayout, camera: &Camera) -> usize {
+        // The eye on the lattice, or the way of the rays.
+        let step = layout.spacing / 2.0;
+        let (eye, way) = match camera.projection {
+            Projection::Perspective { .. } => (Some(camera.eye / step), DVec3::ZERO),
+            Projection::Orthographic { .. } => (None, camera.target - camera.eye),
+        };
+        let triangles = |cube: &Cube| {
+            let [low, high] = cube.lattice_bounds(layout);
+            let is_toward = |axis: &usize| match eye {
+                Some(eye) => eye[*axis] < f64::from(low[*axis]) || eye[*axis] > f64::from(high[*axis]),
+                None => way[*axis] != 0.0,
+            };
+            if (0..3).filter(is_toward).count() == 1 { 10 } else { 12 }
+        };
+        self.cubes.par_iter().map(triangles).sum()
+    }
 }
 
 /// Chooses, classifies and orders cubes. `tree` is that of `grid`, with `value = offset + scale * texel`; the

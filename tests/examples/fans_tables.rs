@@ -1,0 +1,166 @@
+//! Tables and picture of docs/fans.md: `fans_tables DATA PICTURES`.
+//!
+//! `cargo xtask bench fans` runs it. Prints Markdown, and writes `fans.png` into the folder `PICTURES`. Times are
+//! medians of the frames after the first, of the software backend; errors are against the picture in f64 of the
+//! trilinear field between the samples.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use volery::glam::DVec3;
+use volery::output::write_image;
+use volery::{Image, Session, Technique, Thickness, View, ViewOptions};
+use volery_reference::metrics::compare;
+use volery_software::SoftwareBackend;
+use volery_tests::{exact, read_scene, view_of};
+
+const FRAMES: usize = 4;
+
+/// The paper's, of the range of values.
+const FIGURE_9: [f64; 3] = [0.0, 0.18, 0.48];
+const CURVE: [f64; 10] = [0.0, 0.01, 0.02, 0.05, 0.09, 0.18, 0.25, 0.33, 0.48, 0.6];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [data, pictures] = arguments.as_slice() else {
+        return Err("usage: fans_tables DATA PICTURES".into());
+    };
+    head(pictures)?;
+    Engine::open(data)?.tables()
+}
+
+/// One picture, with its times in seconds.
+struct Timed {
+    image: Image,
+    nodes: usize,
+    triangles: usize,
+    select: f64,
+    draw: f64,
+    frame: f64,
+}
+
+/// The scene, by both techniques, and its truth.
+struct Engine {
+    fans: Session,
+    rays: Session,
+    view: View,
+    truth: volery_reference::Image,
+}
+
+impl Engine {
+    fn open(data: &Path) -> Result<Self, Box<dyn Error>> {
+        let input = read_scene(data, "engine");
+        let view = view_of(&input);
+        let open =
+            |technique| Session::open(input.volume.grid.clone(), Box::new(SoftwareBackend::new()), technique);
+        let (fans, mut rays) = (open(Technique::Fans)?, open(Technique::Raycast)?);
+        let mut picture = rays.render(&view)?;
+        let truth = rays.verify(&view, &mut picture, &|_| ())?;
+        Ok(Self { fans, rays, view, truth })
+    }
+
+    fn draw(
+        &mut self,
+        technique: Technique,
+        tolerance: f64,
+        thickness: Thickness,
+    ) -> Result<Timed, Box<dyn Error>> {
+        let view = View { tolerance: Some(tolerance), thickness, ..self.view.clone() };
+        let session = if technique == Technique::Fans { &mut self.fans } else { &mut self.rays };
+        let mut frames = Vec::new();
+        let mut last = session.render(&view)?;
+        for _ in 1..FRAMES {
+            last = session.render(&view)?;
+            frames.push(last.report.seconds);
+        }
+        frames.sort_by(|a, b| a.frame.total_cmp(&b.frame));
+        let seconds = frames[frames.len() / 2];
+        Ok(Timed {
+            image: last.image,
+            nodes: last.report.work.nodes,
+            triangles: last.report.work.triangles.unwrap_or_default(),
+            select: seconds.select,
+            draw: seconds.draw,
+            frame: seconds.frame,
+        })
+    }
+
+    fn errors(&self, timed: &Timed) -> Result<String, Box<dyn Error>> {
+        let found = compare(&exact(&timed.image), &self.truth)?;
+        Ok(format!("{:.5} | {:.4}", found.rmse, found.max))
+    }
+
+    fn tables(&mut self) -> Result<(), Box<dyn Error>> {
+        let [width, height] = [self.view.width, self.view.height];
+        println!("### Figure 9 of the paper, again");
+        println!(
+            "engine 256 x 256 x 128, {width} x {height} pixels, software backend, {} threads. The paper has 5.20 M, \
+             0.19 M and 15.8 K cubes of 256 x 256 x 110 samples by its own transfer function, and 37.5, 0.95 and \
+             0.070 s.\n",
+            rayon::current_num_threads()
+        );
+        println!(
+            "| tolerance | thickness | cubes | triangles | per cube | selection s | rendering s | M cubes/s | rmse | \
+             max |"
+        );
+        println!("|---|---|---|---|---|---|---|---|---|---|");
+        for tolerance in FIGURE_9 {
+            for (thickness, name) in [(Thickness::Exact, "exact"), (Thickness::Interpolated, "interpolated")]
+            {
+                let timed = self.draw(Technique::Fans, tolerance, thickness)?;
+                println!(
+                    "| {} % | {name} | {} | {} | {:.2} | {:.4} | {:.4} | {:.1} | {} |",
+                    tolerance * 100.0,
+                    timed.nodes,
+                    timed.triangles,
+                    timed.triangles as f64 / timed.nodes as f64,
+                    timed.select,
+                    timed.draw,
+                    timed.nodes as f64 / timed.draw / 1e6,
+                    self.errors(&timed)?,
+                );
+            }
+        }
+        println!("\n### Time against error");
+        println!(
+            "Fans with exact thickness, and rays at the same tolerance; a frame is selection and rendering.\n"
+        );
+        println!(
+            "| tolerance | fans: cubes | frame ms | rmse | max | rays: bricks | frame ms | rmse | max |\n\
+             |---|---|---|---|---|---|---|---|---|"
+        );
+        for tolerance in CURVE {
+            let fans = self.draw(Technique::Fans, tolerance, Thickness::Exact)?;
+            let rays = self.draw(Technique::Raycast, tolerance, Thickness::Exact)?;
+            println!(
+                "| {:.0} % | {} | {:.1} | {} | {} | {:.1} | {} |",
+                tolerance * 100.0,
+                fans.nodes,
+                fans.frame * 1e3,
+                self.errors(&fans)?,
+                rays.nodes,
+                rays.frame * 1e3,
+                self.errors(&rays)?,
+            );
+        }
+        Ok(())
+    }
+}
+
+/// A generated head at the paper's tolerances, side by side.
+fn head(folder: &Path) -> Result<(), Box<dyn Error>> {
+    const SIDE: usize = 320;
+    let grid = volery_data::head_u8([128, 160, 160], DVec3::ONE);
+    let mut session = Session::open(grid, Box::new(SoftwareBackend::new()), Technique::Fans)?;
+    let view =
+        session.view(&ViewOptions { width: SIDE as u32, height: SIDE as u32, ..ViewOptions::default() });
+    let mut pictures = Vec::new();
+    for tolerance in FIGURE_9 {
+        pictures.push(session.render(&View { tolerance: Some(tolerance), ..view.clone() })?.image);
+    }
+    let rows =
+        (0..SIDE).flat_map(|row| pictures.iter().map(move |picture| &picture.pixels[row * SIDE..][..SIDE]));
+    let pixels = rows.flatten().copied().collect();
+    let width = view.width * pictures.len() as u32;
+    Ok(write_image(&folder.join("fans.png"), &Image { width, height: view.height, pixels })?)
+}
