@@ -60,7 +60,7 @@ impl Backend for Shared {
     }
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
-        self.0.lock().expect("no draw panics").1 = Some(layout.clone());
+        self.0.lock().expect("no draw panics").1 = Some(*layout);
         self.with(|backend| backend.set_volume(layout))
     }
 
@@ -291,10 +291,10 @@ fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
     for (backend, sampling, shows_nodes) in rows {
         let mut session = Session::open(grid.clone(), backend, Technique::Plane)?;
         let mut view = session.view(&ViewOptions { width: 300, height: 300, ..ViewOptions::default() });
-        view.planes.focus = Some(Focus { point: DVec3::new(290.0, 290.0, 0.0), quality: 0.5 });
+        view.planes.focus = Some(Focus { point: DVec3::new(350.0, 350.0, 0.0), quality: 0.5 });
         (view.planes.sampling, view.planes.shows_nodes) = (sampling, shows_nodes);
-        let target = DVec3::new(345.0, 345.0, 0.0);
-        let projection = Projection::Orthographic { height: 200.0 };
+        let target = DVec3::new(405.0, 405.0, 0.0);
+        let projection = Projection::Orthographic { height: 140.0 };
         view.camera = Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection };
         pictures.push(session.render(&view)?.image);
     }

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::builder::{OsStringValueParser, PathBufValueParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::{BackendChoice, Plane, Preset, Thickness};
@@ -74,9 +75,9 @@ pub(crate) struct RenderArgs {
     /// more of the data has arrived, else coarse ones first
     #[arg(long, value_name = "DIR")]
     pub(crate) progressive: Option<PathBuf>,
-    /// How the length of a ray in a cube is found (technique fans)
-    #[arg(long, value_enum, default_value_t = ThicknessName::Exact)]
-    pub(crate) thickness: ThicknessName,
+    /// How the length of a ray in a cube is found, exact if missing (technique fans)
+    #[arg(long, value_enum)]
+    pub(crate) thickness: Option<ThicknessName>,
     #[command(flatten)]
     pub(crate) planes: PlaneArgs,
     /// Folder that the paths in a scene file are relative to [default: that of the scene file]
@@ -129,6 +130,47 @@ pub(crate) struct PlaneArgs {
     pub(crate) show_nodes: bool,
 }
 
+impl Cli {
+    /// Finds options that the technique asked for would not read.
+    pub(crate) fn checked(self) -> Result<Self, clap::Error> {
+        let Command::Render(args) = &self.command else { return Ok(self) };
+        let PlaneArgs { planes, focus, quality: _, error, transparent, nearest, show_nodes } = &args.planes;
+        let given = [
+            ("--plane", !planes.is_empty()),
+            ("--focus", focus.is_some()),
+            ("--error", error.is_some()),
+            ("--transparent", *transparent),
+            ("--nearest", *nearest),
+            ("--show-nodes", *show_nodes),
+        ];
+        let of_planes =
+            given.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| (name, Technique::Plane));
+        let of_fans = args.thickness.map(|_| ("--thickness", Technique::Fans));
+        let is_unread = |(_, needed): &(&str, Technique)| {
+            // What suits an input may be planes, but never fans.
+            let auto = *needed == Technique::Plane && args.technique == Technique::Auto;
+            args.technique != *needed && !auto
+        };
+        match of_planes.into_iter().chain(of_fans).find(is_unread) {
+            None => Ok(self),
+            Some((option, needed)) => {
+                let needed =
+                    needed.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+                let message = format!("{option} is read by --technique {needed} alone");
+                Err(Self::command().error(ErrorKind::ArgumentConflict, message))
+            }
+        }
+    }
+}
+
+impl PlaneArgs {
+    /// Whether anything says that planes are wanted.
+    pub(crate) fn is_given(&self) -> bool {
+        let Self { planes, focus, quality: _, error, transparent, nearest, show_nodes } = self;
+        !planes.is_empty() || focus.is_some() || error.is_some() || *transparent || *nearest || *show_nodes
+    }
+}
+
 /// `volery info`
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
@@ -161,7 +203,7 @@ pub(crate) struct DemoArgs {
 /// How to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Technique {
-    /// What suits the input: raycast for volumes, plane for images and colours
+    /// What suits the input: raycast for volumes, plane for images and colours and where an option asks for it
     Auto,
     /// One ray per pixel through the nodes of a cut
     Raycast,
@@ -304,7 +346,6 @@ fn parse_transfer(name: std::ffi::OsString) -> Result<Transfer, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {

@@ -27,6 +27,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     };
     let grid = &input.volume.grid;
     let technique = match args.technique {
+        Technique::Auto if args.planes.is_given() => volery::Technique::Plane,
         Technique::Auto => volery::Technique::suiting(grid),
         Technique::Raycast => volery::Technique::Raycast,
         Technique::Plane => volery::Technique::Plane,
@@ -88,7 +89,7 @@ fn view(args: &RenderArgs, input: &Input, session: &Session) -> Result<View, Fai
         }
     };
     view.tolerance = args.tolerance;
-    view.thickness = args.thickness.into();
+    view.thickness = args.thickness.map(Into::into).unwrap_or_default();
     Ok(view)
 }
 

@@ -43,7 +43,17 @@ fn wrong_command_lines_are_status_2() {
         ("render waves.nrrd -o a.png --backend vulkan", &["vulkan", "software"]),
         ("render waves.nrrd -o a.png --frames 0", &["--frames"]),
         ("render waves.nrrd -o a.png --threads 0", &["--threads"]),
-        ("render waves.nrrd -o a.png --error 0.1", &["--error"]),
+        ("render waves.nrrd -o a.png --error 2", &["0 to 1"]),
+        ("render waves.nrrd -o a.png --technique raycast --error 0.1", &["--error", "plane"]),
+        ("render waves.nrrd -o a.png --technique fans --show-nodes", &["--show-nodes", "plane"]),
+        ("render waves.nrrd -o a.png --thickness exact", &["--thickness", "fans"]),
+        ("render waves.nrrd -o a.png --plane 1,2,3", &["NX,NY,NZ,D"]),
+        ("render waves.nrrd -o a.png --plane 0,0,0,1", &["normal"]),
+        ("render waves.nrrd -o a.png --plane 0,0,1,inf", &["distance"]),
+        ("render waves.nrrd -o a.png --focus 1", &["X,Y,Z"]),
+        ("render waves.nrrd -o a.png --focus 1,2,nan", &["X,Y,Z"]),
+        ("render waves.nrrd -o a.png --quality 2", &["--focus"]),
+        ("render waves.nrrd -o a.png --focus 1,2,3 --quality -1", &["at least 0"]),
         ("render waves.nrrd -o a.png --error-map e.txt", &["e.txt"]),
         ("info", &["FILE"]),
     ] {
@@ -163,10 +173,12 @@ fn volumes_with_nothing_to_cast_rays_through_are_status_1() {
     for (name, words) in [
         ("blank.nrrd", &["blank", "finite"][..]),
         ("wide.nrrd", &["range"]),
-        ("colors.nrrd", &["rgb8"]),
-        ("flat.nrrd", &["9 x 8 x 1", "at least 2"]),
+        ("colors.nrrd", &["rgb8", "plane"]),
+        ("flat.nrrd", &["9 x 8 x 1", "at least 2", "plane"]),
     ] {
-        fails(&shop, &format!("render {name} -o a.png"), 1, &[words, &[name]].concat());
+        let line = format!("render {name} -o a.png --technique");
+        fails(&shop, &format!("{line} raycast"), 1, &[words, &[name]].concat());
+        fails(&shop, &format!("{line} fans"), 1, &[words, &[name]].concat());
         shop.done(&format!("info {name}"));
         shop.done(&format!("info {name} --json"));
     }

@@ -298,13 +298,23 @@ fn info_tells_what_a_file_is() {
 }
 
 #[test]
-fn info_knows_images_that_cannot_be_ray_cast() {
+fn images_are_known_and_drawn_as_what_they_are() {
     let shop = Workshop::new();
     shop.done("render waves.nrrd -o picture.png --size 20x10");
     let info: Value = serde_json::from_str(&shop.done("info picture.png --json").stdout).unwrap();
     assert_eq!((&info["kind"], &info["scalar"]), (&Value::from("image"), &Value::from("rgb8")));
     assert_eq!(info["channels"].as_array().unwrap().len(), 3);
-    shop.run_line("render picture.png -o b.png").fails(1, &["picture.png", "rgb8", "one channel"]);
+    let line = "render picture.png -o b.png --technique raycast";
+    shop.run_line(line).fails(1, &["picture.png", "rgb8", "one channel"]);
+    // Straight at the image: one pixel a sample, and the margin around it.
+    shop.done("render picture.png -o c.exr --size 44x24 --report c.json --verify");
+    let report = shop.json("c.json");
+    assert_eq!(
+        (&report["input"]["kind"], &report["technique"]),
+        (&Value::from("image"), &Value::from("plane"))
+    );
+    let max = report["error"]["measured_max"].as_f64().unwrap();
+    assert!(max < 1e-5, "{max}");
 }
 
 #[test]
@@ -312,10 +322,10 @@ fn the_demo_draws_every_technique_and_a_contact_sheet() {
     let shop = Workshop::new();
     let outcome = shop.done("demo -o pictures --backend software");
     let lines: Vec<_> = outcome.stdout.lines().collect();
-    assert_eq!(lines.len(), 1 + 2 * 4 + 1, "{}", outcome.stdout);
+    assert_eq!(lines.len(), 1 + 2 * 6 + 1, "{}", outcome.stdout);
     assert!(lines.last().unwrap().ends_with("contact-sheet.png"));
     let pictures = std::fs::read_dir(shop.path("pictures")).unwrap().count();
-    assert_eq!(pictures, 2 * 5 + 1);
+    assert_eq!(pictures, 2 * 7 + 1);
     let sheet = volery::io::read_png_rgb(&shop.path("pictures/contact-sheet.png")).unwrap();
-    assert!(sheet.width > 5 * 320 && sheet.height > 2 * 320);
+    assert!(sheet.width > 7 * 320 && sheet.height > 2 * 320);
 }

@@ -114,9 +114,8 @@ impl Steps {
                 if depth > here { next.min(depth) } else { next }
             });
             let middle = origin + direction * ((here + next) / 2.0);
-            let [x, y, z] = [0, 1, 2].map(|axis| {
-                ((middle[axis] + 0.5).floor().max(0.0) as usize).min(self.dims[axis] - 1)
-            });
+            let [x, y, z] = [0, 1, 2]
+                .map(|axis| ((middle[axis] + 0.5).floor().max(0.0) as usize).min(self.dims[axis] - 1));
             if let Some((color, extinction)) = self.matter[(z * self.dims[1] + y) * self.dims[0] + x] {
                 let opacity = -(-extinction * (next - here)).exp_m1();
                 (0..3).for_each(|i| light[i] += transmittance * opacity * color[i]);
@@ -296,9 +295,9 @@ fn layout(grid: &VoxelGrid) -> VolumeLayout {
 
 /// Where a ray enters and leaves a cube, if it is in it for more than rounding.
 fn span(ray: &Ray, cube: &Cube, layout: &VolumeLayout) -> Option<[f64; 2]> {
-    let [low, high] = cube.lattice_bounds(layout).map(|corner| {
-        DVec3::from_array(corner.map(|i| f64::from(i) / 2.0)) * layout.spacing
-    });
+    let [low, high] = cube
+        .lattice_bounds(layout)
+        .map(|corner| DVec3::from_array(corner.map(|i| f64::from(i) / 2.0)) * layout.spacing);
     let (a, b) = ((low - ray.origin) / ray.direction, (high - ray.origin) / ray.direction);
     let (enter, leave) = (a.min(b).max_element().max(0.0), a.max(b).min_element());
     (leave > enter + 1e-6).then_some([enter, leave])
@@ -313,7 +312,8 @@ fn transparent_cubes_are_skipped() {
     let points = [(low, 0.0), (middle, 0.0), (middle, 0.4), (high, 0.4)];
     let points = points.map(|(value, opacity)| ControlPoint { value, color: [1.0; 3], opacity });
     let transfer = TransferFunction::new(points.to_vec(), 1.0).unwrap();
-    draw(&mut session, &View { transfer, tolerance: None, ..whole_view(&session) });
+    let view = View { transfer, ..whole_view(&session) };
+    draw(&mut session, &view);
     let num_visible =
         (0..grid.num_samples()).filter(|&place| grid.samples().value(place, 0) > middle).count();
     let num_drawn = kept.lock().unwrap().len();
@@ -360,16 +360,17 @@ fn triangles_are_those_of_the_fans() {
         if orthographic {
             camera.projection = Projection::Orthographic { height: 20.0 };
         }
-        let report = draw(&mut session, &View { camera, ..whole_view(&session) }).report;
+        let view = View { camera, ..whole_view(&session) };
+        let report = draw(&mut session, &view).report;
         let viewpoint = if orthographic {
             volery_cubefan::Viewpoint::Direction((target - eye).to_array())
         } else {
             volery_cubefan::Viewpoint::Eye(eye.to_array())
         };
         let triangles = |cube: &Cube| {
-            let [low, high] = cube
-                .lattice_bounds(&layout)
-                .map(|corner| std::array::from_fn(|axis| f64::from(corner[axis]) * layout.spacing[axis] / 2.0));
+            let [low, high] = cube.lattice_bounds(&layout).map(|corner| {
+                std::array::from_fn(|axis| f64::from(corner[axis]) * layout.spacing[axis] / 2.0)
+            });
             let cuboid = volery_cubefan::Cuboid { low, high };
             volery_cubefan::Fans::new(viewpoint, &cuboid).unwrap().triangles().len()
         };
