@@ -1,49 +1,56 @@
-//! A view coarse at once, and finer while it rests.
+//! Pictures of one view of cubes, coarse at once and finer while the view rests (Schussman and Max 2001, section 8).
 //!
-//! Where all data are at hand, what takes time is drawing. So the first picture allows half of the value range, each
-//! further one half of what the one before did, and the last is the view's own (Schussman and Max 2001, section 8,
-//! navigate so). Stop taking pictures when the view changes.
+//! Each picture allows half of the error of the one before, until the view's own tolerance is reached; where that is
+//! none or less than 1/256 of the range, the view's own follows on the last that is above.
 
-use super::{RenderError, Session, Step, View};
+use super::{Picture, RenderError, Session, Step, View};
 
-/// The tolerance of the first picture.
-const FIRST_TOLERANCE: f64 = 0.5;
-/// The least tolerance but that of the last picture.
-const LEAST_TOLERANCE: f64 = 1.0 / 128.0;
+/// What the first picture may miss, as a fraction of the value range: the paper's coarsest.
+const FIRST_TOLERANCE: f64 = 0.48;
 
-/// The pictures of one view from coarse to its own, an iterator; see [`Session::refinements`].
-pub struct Refinements<'a> {
+/// Below this the next picture is the last: most cubes are there already.
+const LEAST_TOLERANCE: f64 = 1.0 / 256.0;
+
+/// The pictures of one view, an iterator; see [`Session::refine`].
+pub struct Refine<'a> {
     session: &'a mut Session,
     view: View,
-    tolerance: f64,
-    is_done: bool,
+    /// Of the next picture; `None` after the last.
+    tolerance: Option<f64>,
 }
 
 impl Session {
-    /// Draws a view with smaller and smaller tolerances, its own last: that picture is the one of
-    /// [`Session::render`], bit for bit.
+    /// Draws a view again and again with ever smaller tolerances; the last picture is that of [`Session::render`], bit
+    /// for bit. Whoever moves on drops the rest.
     ///
     /// # Errors
     /// When the view is not meaningful.
-    pub fn refinements(&mut self, view: &View) -> Result<Refinements<'_>, RenderError> {
+    pub fn refine(&mut self, view: &View) -> Result<Refine<'_>, RenderError> {
         self.check(view)?;
-        Ok(Refinements { session: self, view: view.clone(), tolerance: FIRST_TOLERANCE, is_done: false })
+        let first = FIRST_TOLERANCE.max(view.tolerance.unwrap_or(0.0));
+        Ok(Refine { session: self, view: view.clone(), tolerance: Some(first) })
     }
 }
 
-impl Iterator for Refinements<'_> {
+impl Refine<'_> {
+    fn picture(&mut self, tolerance: f64) -> Result<Step, RenderError> {
+        let own = self.view.tolerance.unwrap_or(0.0);
+        let is_last = tolerance <= own.max(LEAST_TOLERANCE);
+        let picture: Picture = if is_last {
+            self.session.render(&self.view)?
+        } else {
+            self.session.render(&View { tolerance: Some(tolerance), ..self.view.clone() })?
+        };
+        self.tolerance = (!is_last).then_some((tolerance / 2.0).max(own));
+        Ok(Step { picture, is_last })
+    }
+}
+
+impl Iterator for Refine<'_> {
     type Item = Result<Step, RenderError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.is_done {
-            return None;
-        }
-        let last = self.view.tolerance.unwrap_or(0.0);
-        let is_last = self.tolerance <= last.max(LEAST_TOLERANCE / 2.0);
-        let tolerance = if is_last { self.view.tolerance } else { Some(self.tolerance) };
-        self.tolerance /= 2.0;
-        let picture = self.session.render(&View { tolerance, ..self.view.clone() });
-        self.is_done = is_last || picture.is_err();
-        Some(picture.map(|picture| Step { picture, is_last }))
+        let tolerance = self.tolerance.take()?;
+        Some(self.picture(tolerance))
     }
 }
