@@ -291,10 +291,10 @@ fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
     for (backend, sampling, shows_nodes) in rows {
         let mut session = Session::open(grid.clone(), backend, Technique::Plane)?;
         let mut view = session.view(&ViewOptions { width: 300, height: 300, ..ViewOptions::default() });
-        view.planes.focus = Some(Focus { point: DVec3::new(350.0, 350.0, 0.0), quality: 0.5 });
+        view.planes.focus = Some(Focus { point: DVec3::new(290.0, 290.0, 0.0), quality: 0.5 });
         (view.planes.sampling, view.planes.shows_nodes) = (sampling, shows_nodes);
-        let target = DVec3::new(405.0, 405.0, 0.0);
-        let projection = Projection::Orthographic { height: 140.0 };
+        let target = DVec3::new(360.0, 360.0, 0.0);
+        let projection = Projection::Orthographic { height: 160.0 };
         view.camera = Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection };
         pictures.push(session.render(&view)?.image);
     }

@@ -75,9 +75,11 @@ struct Vertex {
     // Of the way from the eye to the exit: the part before the cube and the part in it. Then the entry's way from
     // the plane where parallel rays start.
     @location(0) shares: vec3f,
-    // Below zero if the eye is in the cube: its faces reach behind the eye, where nothing is linear on the screen.
-    @location(1) @interpolate(linear) thickness: f32,
-    // Colour and extinction.
+    // Thickness times depth: divided by the interpolated depth it is linear on the screen. (The attribute that makes it
+    // linear directly is wrong by a third on llvmpipe in triangles that are clipped.)
+    @location(1) depth_thickness: f32,
+    // Colour and extinction; that is below zero where a cube reaches behind the eye, for then nothing is linear on
+    // the screen, and the length is exact.
     @location(2) @interpolate(flat) matter: vec4f,
 }
 
@@ -110,8 +112,8 @@ struct Place {
     point: vec3f,
     before: f32,
     through: f32,
-    // Whether the eye is in the cube.
-    is_inside: bool,
+    // Whether a part of the cube is behind the eye.
+    is_around_eye: bool,
 }
 
 fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
@@ -137,11 +139,13 @@ fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
     let is_high_end = select(is_high_corner, is_high, is_first & vec3<bool>(is_inner));
     let plane = select(low_plane, high_plane, is_high_end);
     let end = (vec3f(plane - frame.anchor_whole) - frame.anchor_fraction) * frame.step;
+    let least_depth = min(low * frame.clip_w.xyz, high * frame.clip_w.xyz);
+    let is_around_eye = !is_parallel && least_depth.x + least_depth.y + least_depth.z <= 0.0;
     if !is_outside {
         return Place(end, 1.0, 1.0, true);
     }
     if !is_inner {
-        return Place(end, 1.0, 0.0, false);
+        return Place(end, 1.0, 0.0, is_around_eye);
     }
     let before = near[first] / far[first];
     let through = size[first] / far[first];
@@ -152,7 +156,7 @@ fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
     let from_afar = end + clamp(-through * end_seen, least, most);
     let from_nearby = clamp(before * end_seen, low, high) - frame.anchor_from_eye;
     let drawn = select(from_afar, from_nearby, through > 0.5 && !is_parallel);
-    return Place(select(drawn, end, is_first), before, through, false);
+    return Place(select(drawn, end, is_first), before, through, is_around_eye);
 }
 
 @vertex
@@ -174,9 +178,9 @@ fn fan(@builtin(vertex_index) vertex: u32, @builtin(instance_index) batch: u32) 
     out.position = vec4f(dot(frame.clip_x, position), dot(frame.clip_y, position), 0.5 * w, w);
     out.shares = vec3f(place.before, place.through, dot(frame.depth, position));
     let reach = select(length(place.point + frame.anchor_from_eye), 1.0, frame.is_parallel != 0u);
-    out.thickness = select(reach * place.through / place.before, -1.0, place.is_inside);
+    out.depth_thickness = w * reach * place.through / place.before;
     let extinction = min(min(cube.extinction, MAX_EXTINCTION) * frame.unit_length, MAX_EXTINCTION);
-    out.matter = vec4f(cube.red, cube.green, cube.blue, extinction);
+    out.matter = vec4f(cube.red, cube.green, cube.blue, select(extinction, -extinction, place.is_around_eye));
     return out;
 }
 
@@ -189,8 +193,8 @@ fn opacity_of(depth: f32) -> f32 {
 
 @fragment
 fn matter(in: Vertex) -> @location(0) vec4f {
-    var thickness = in.thickness;
-    if IS_EXACT || thickness < 0.0 {
+    var thickness = in.depth_thickness * in.position.w;
+    if IS_EXACT || in.matter.w < 0.0 {
         // Of a ray, length per depth; depth is one over `w`.
         let slope = (in.position.xy - frame.center) * frame.slope_per_pixel;
         let length_per_depth = sqrt(1.0 + dot(slope, slope));
@@ -198,6 +202,6 @@ fn matter(in: Vertex) -> @location(0) vec4f {
     }
     // Less what is before the start of the ray.
     let length = max(thickness + min(in.shares.z, 0.0), 0.0);
-    let opacity = opacity_of(min(length * in.matter.w, OPAQUE_DEPTH));
+    let opacity = opacity_of(min(length * abs(in.matter.w), OPAQUE_DEPTH));
     return vec4f(in.matter.rgb * opacity, opacity);
 }

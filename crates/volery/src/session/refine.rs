@@ -1,18 +1,18 @@
-//! Pictures of one view of cubes, coarse at once and finer while the view rests (Schussman and Max 2001, section 8).
+//! Pictures of one view, coarse at once and finer while the view rests (Schussman and Max 2001, section 8).
 //!
-//! Each picture allows half of the error of the one before, until the view's own tolerance is reached; where that is
-//! none or less than 1/256 of the range, the view's own follows on the last that is above.
+//! Each picture allows half of the error of the one before, until the view's own tolerance is reached, or less than
+//! [`LEAST_TOLERANCE`]: then the view itself is drawn.
 
 use super::{Picture, RenderError, Session, Step, View};
 
 /// What the first picture may miss, as a fraction of the value range: the paper's coarsest.
 const FIRST_TOLERANCE: f64 = 0.48;
 
-/// Below this the next picture is the last: most cubes are there already.
+/// Below this the next picture is the last: most nodes are there already.
 const LEAST_TOLERANCE: f64 = 1.0 / 256.0;
 
-/// The pictures of one view, an iterator; see [`Session::refine`].
-pub struct Refine<'a> {
+/// The pictures of one view, an iterator; see [`Session::refinements`].
+pub struct Refinements<'a> {
     session: &'a mut Session,
     view: View,
     /// Of the next picture; `None` after the last.
@@ -20,19 +20,19 @@ pub struct Refine<'a> {
 }
 
 impl Session {
-    /// Draws a view again and again with ever smaller tolerances; the last picture is that of [`Session::render`], bit
+    /// Draws a view of matter again and again with ever smaller tolerances; the last picture is that of [`Session::render`], bit
     /// for bit. Whoever moves on drops the rest.
     ///
     /// # Errors
     /// When the view is not meaningful.
-    pub fn refine(&mut self, view: &View) -> Result<Refine<'_>, RenderError> {
+    pub fn refinements(&mut self, view: &View) -> Result<Refinements<'_>, RenderError> {
         self.check(view)?;
         let first = FIRST_TOLERANCE.max(view.tolerance.unwrap_or(0.0));
-        Ok(Refine { session: self, view: view.clone(), tolerance: Some(first) })
+        Ok(Refinements { session: self, view: view.clone(), tolerance: Some(first) })
     }
 }
 
-impl Refine<'_> {
+impl Refinements<'_> {
     fn picture(&mut self, tolerance: f64) -> Result<Step, RenderError> {
         let own = self.view.tolerance.unwrap_or(0.0);
         let is_last = tolerance <= own.max(LEAST_TOLERANCE);
@@ -46,7 +46,7 @@ impl Refine<'_> {
     }
 }
 
-impl Iterator for Refine<'_> {
+impl Iterator for Refinements<'_> {
     type Item = Result<Step, RenderError>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -80,9 +80,15 @@ pub(crate) fn plan(
     view: &View,
     tolerance: f64,
 ) -> Plan {
-    let classify = |texel: f32| {
+    let of_texel = |texel: f32| {
         let (color, opacity) = view.transfer.classify(offset + scale * f64::from(texel));
         (color.map(|c| c as f32), view.transfer.extinction_of_opacity(opacity) as f32)
+    };
+    // Bytes need no logarithm each.
+    let of_bytes: Vec<_> = (0..=u8::MAX).map(|byte| of_texel(byte.into())).collect();
+    let classify = |texel: f32| {
+        let byte = texel as u8;
+        if f32::from(byte) == texel { of_bytes[usize::from(byte)] } else { of_texel(texel) }
     };
     let cubes = for_samples!(grid.samples(), |values| {
         let walk = Walk {
