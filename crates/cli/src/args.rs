@@ -24,7 +24,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Draw a volume
-    Render(RenderArgs),
+    Render(Box<RenderArgs>),
     /// Say what a file is: kind, dims, type, spacing, range, histogram
     Info(InfoArgs),
     /// Draw generated volumes in every way there is; needs no file

@@ -15,7 +15,7 @@ use crate::sheet::{Tile, contact_sheet};
 use crate::{Failure, say};
 
 /// Width and height of a picture.
-const SIDE: u32 = 320;
+const SIDE: u32 = 272;
 
 /// Frames per row; the first also uploads.
 const FRAMES: usize = 5;

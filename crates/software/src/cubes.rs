@@ -200,9 +200,9 @@ impl<S: Simd> Matter<S> {
         let opacity = opacity_of_depth(simd, length * self.depth_per_length);
         let transmittance = f32x16::from_slice(simd, &light[3]);
         let share = opacity * transmittance;
-        for channel in 0..3 {
-            let sum = f32x16::from_slice(simd, &light[channel]);
-            light[channel] = share.mul_add(f32x16::splat(simd, self.color[channel]), sum).into();
+        for (light, color) in light.iter_mut().zip(self.color) {
+            let sum = f32x16::from_slice(simd, light);
+            *light = share.mul_add(f32x16::splat(simd, color), sum).into();
         }
         let rest = transmittance - share;
         light[3] = rest.into();

@@ -20,6 +20,9 @@
 //! through 512^3 samples of 8 bits (bench `plane`, 2 cores of a shared machine): 5.2 ms for 512x512 pixels, 15 ms for
 //! 1024x1024, within 2e-6 of f64.
 //!
+//! Cubes of constant matter are sorted by tile and composited sixteen pixels at a time, see `cubes`: 30 million per
+//! second on those 2 cores, where they are two pixels large.
+//!
 //! # Error
 //! A half cell is integrated as if the field were linear over it, a quarter where the cubic bends much: of second
 //! order in the size of a cell, and nothing at all along the axes, where the field is linear. The straight lines

@@ -128,6 +128,7 @@ struct Hit<S: Simd> {
 }
 
 impl<S: Simd> Hit<S> {
+    #[expect(clippy::redundant_closure, reason = "only a closure that is written where it is passed can be inlined so")]
     #[inline(always)]
     fn new(simd: S, plane: &PlaneTile, layout: &VolumeLayout, x: f32x16<S>, y: f32x16<S>) -> Self {
         let (a, b) = (x - plane.anchor[0], y - plane.anchor[1]);
@@ -144,9 +145,9 @@ impl<S: Simd> Hit<S> {
         );
         let depth = at(3);
         lanes &= depth.simd_ge(splat(plane.first_depth));
-        for axis in 0..3 {
+        for (axis, place) in place.iter().enumerate() {
             let [low, high] = [0.0, layout.cells[axis] as f32].map(|end| splat(end - plane.base[axis]));
-            lanes &= place[axis].simd_ge(low) & place[axis].simd_le(high);
+            lanes &= place.simd_ge(low) & place.simd_le(high);
         }
         Self { place, depth, inverse, lanes }
     }

@@ -67,6 +67,10 @@ impl<T: Texel> Field<'_, T> {
     }
 
     /// How much of the low samples counts.
+    #[expect(
+        clippy::redundant_closure,
+        reason = "only a closure that is written where it is passed can be inlined so"
+    )]
     #[inline(always)]
     fn ratio<S: Simd>(&self, simd: S, place: &[f32x16<S>; 3]) -> f32x16<S> {
         let corner = |i: usize| f32x16::splat(simd, f32::from(self.blended.low_corners >> i & 1));

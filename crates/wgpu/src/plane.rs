@@ -221,7 +221,6 @@ fn shader_frame(frame: &Frame<'_>, content: &Planes<'_>, pool: &Pool, grid: &Bri
         is_nearest: (content.sampling == Sampling::Nearest).into(),
         is_transparent: content.is_transparent.into(),
         shows_bricks: content.shows_bricks.into(),
-        ..bytemuck::Zeroable::zeroed()
     }
 }
 

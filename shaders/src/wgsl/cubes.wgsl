@@ -73,14 +73,12 @@ const SERIES_DEPTH: f32 = 0.25;
 struct Vertex {
     @builtin(position) position: vec4f,
     // Of the way from the eye to the exit: the part before the cube and the part in it. Then the entry's way from
-    // the plane where parallel rays start.
-    @location(0) shares: vec3f,
-    // Thickness times depth: divided by the interpolated depth it is linear on the screen. (The attribute that makes it
-    // linear directly is wrong by a third on llvmpipe in triangles that are clipped.)
-    @location(1) depth_thickness: f32,
+    // the plane where parallel rays start. Then thickness times depth, which divided by the depth is linear on the
+    // screen. (What is interpolated linearly by declaration is wrong on llvmpipe in triangles that are clipped.)
+    @location(0) shares: vec4f,
     // Colour and extinction; that is below zero where a cube reaches behind the eye, for then nothing is linear on
     // the screen, and the length is exact.
-    @location(2) @interpolate(flat) matter: vec4f,
+    @location(1) @interpolate(flat) matter: vec4f,
 }
 
 // A bound of a cube, clipped to the domain: twice the finest-sample coordinates.
@@ -176,9 +174,9 @@ fn fan(@builtin(vertex_index) vertex: u32, @builtin(instance_index) batch: u32) 
     let position = vec4f(place.point, 1.0);
     let w = dot(frame.clip_w, position);
     out.position = vec4f(dot(frame.clip_x, position), dot(frame.clip_y, position), 0.5 * w, w);
-    out.shares = vec3f(place.before, place.through, dot(frame.depth, position));
     let reach = select(length(place.point + frame.anchor_from_eye), 1.0, frame.is_parallel != 0u);
-    out.depth_thickness = w * reach * place.through / place.before;
+    let thickness = reach * place.through / place.before;
+    out.shares = vec4f(place.before, place.through, dot(frame.depth, position), w * thickness);
     let extinction = min(min(cube.extinction, MAX_EXTINCTION) * frame.unit_length, MAX_EXTINCTION);
     out.matter = vec4f(cube.red, cube.green, cube.blue, select(extinction, -extinction, place.is_around_eye));
     return out;
@@ -193,7 +191,7 @@ fn opacity_of(depth: f32) -> f32 {
 
 @fragment
 fn matter(in: Vertex) -> @location(0) vec4f {
-    var thickness = in.depth_thickness * in.position.w;
+    var thickness = in.shares.w * in.position.w;
     if IS_EXACT || in.matter.w < 0.0 {
         // Of a ray, length per depth; depth is one over `w`.
         let slope = (in.position.xy - frame.center) * frame.slope_per_pixel;

@@ -325,7 +325,8 @@ fn transparent_cubes_are_skipped() {
 
 #[test]
 fn the_number_of_threads_changes_neither_cubes_nor_pixels() {
-    let mut expected: Option<(Vec<Cube>, Vec<[u32; 3]>, Vec<[u32; 3]>)> = None;
+    type Bits = Vec<[u32; 3]>;
+    let mut expected: Option<(Vec<Cube>, [Bits; 2])> = None;
     for num_threads in [1, 2, 5] {
         let pool = ThreadPoolBuilder::new().num_threads(num_threads).build().unwrap();
         let found = pool.install(|| {
@@ -333,10 +334,10 @@ fn the_number_of_threads_changes_neither_cubes_nor_pixels() {
             let view = View { tolerance: Some(0.3), ..whole_view(&session) };
             let mut bits = |thickness| {
                 let image = draw(&mut session, &View { thickness, ..view.clone() }).image;
-                image.pixels.iter().map(|pixel| pixel.map(f32::to_bits)).collect::<Vec<_>>()
+                image.pixels.iter().map(|pixel| pixel.map(f32::to_bits)).collect::<Bits>()
             };
-            let pictures = (bits(Thickness::Exact), bits(Thickness::Interpolated));
-            (std::mem::take(&mut *kept.lock().unwrap()), pictures.0, pictures.1)
+            let pictures = [bits(Thickness::Exact), bits(Thickness::Interpolated)];
+            (std::mem::take(&mut *kept.lock().unwrap()), pictures)
         });
         match &expected {
             None => expected = Some(found),

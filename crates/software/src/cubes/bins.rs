@@ -244,9 +244,9 @@ impl Projector {
             #[inline(always)]
             |i| {
                 let mut sum = f32x16::splat(simd, self.middle[i]);
-                for axis in 0..3 {
-                    sum = f32x16::from_slice(simd, &sums[axis])
-                        .mul_add(f32x16::splat(simd, self.per_half_step[i][axis]), sum);
+                for (sums, &per_half_step) in sums.iter().zip(&self.per_half_step[i]) {
+                    let sums = f32x16::from_slice(simd, sums);
+                    sum = sums.mul_add(f32x16::splat(simd, per_half_step), sum);
                 }
                 sum
             },
@@ -302,8 +302,8 @@ impl Projector {
 #[inline(always)]
 fn corner_of<S: Simd>(center: f32x16<S>, half: [f32x16<S>; 3], corner: u32) -> f32x16<S> {
     let mut sum = center;
-    for axis in 0..3 {
-        sum = if corner >> axis & 1 == 1 { sum + half[axis] } else { sum - half[axis] };
+    for (axis, half) in half.into_iter().enumerate() {
+        sum = if corner >> axis & 1 == 1 { sum + half } else { sum - half };
     }
     sum
 }
