@@ -1,15 +1,18 @@
 //! Tables and picture of docs/fans.md: `fans_tables DATA PICTURES`.
 //!
 //! `cargo xtask bench fans` runs it. Prints Markdown, and writes `fans.png` into the folder `PICTURES`. Times are
-//! medians of the frames after the first, of the software backend; errors are against the picture in f64 of the
-//! trilinear field between the samples.
+//! medians of the frames after the first, of the software backend where nothing else is said; errors are against the
+//! picture in f64 of the trilinear field between the samples.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use volery::glam::DVec3;
 use volery::output::write_image;
-use volery::{ControlPoint, Image, Session, Technique, Thickness, TransferFunction, View, ViewOptions};
+use volery::{
+    BackendChoice, ControlPoint, Image, Session, Technique, Thickness, TransferFunction, View, ViewOptions,
+    open_backend,
+};
 use volery_reference::metrics::compare;
 use volery_software::SoftwareBackend;
 use volery_tests::{exact, read_scene, view_of};
@@ -39,9 +42,31 @@ struct Timed {
     frame: f64,
 }
 
+/// The last of some frames, with the times of the median of those after the first.
+fn draw(session: &mut Session, view: &View) -> Result<Timed, Box<dyn Error>> {
+    let mut frames = Vec::new();
+    let mut last = session.render(view)?;
+    for _ in 1..FRAMES {
+        last = session.render(view)?;
+        frames.push(last.report.seconds);
+    }
+    frames.sort_by(|a, b| a.frame.total_cmp(&b.frame));
+    let seconds = frames[frames.len() / 2];
+    Ok(Timed {
+        image: last.image,
+        nodes: last.report.work.nodes,
+        triangles: last.report.work.triangles.unwrap_or_default(),
+        select: seconds.select,
+        draw: seconds.draw,
+        frame: seconds.frame,
+    })
+}
+
 /// The scene, by both techniques, and its truth.
 struct Engine {
     fans: Session,
+    /// On the best device of wgpu.
+    gpu_fans: Session,
     rays: Session,
     view: View,
     truth: volery_reference::Image,
@@ -51,38 +76,15 @@ impl Engine {
     fn open(data: &Path) -> Result<Self, Box<dyn Error>> {
         let input = read_scene(data, "engine");
         let view = view_of(&input);
-        let open =
-            |technique| Session::open(input.volume.grid.clone(), Box::new(SoftwareBackend::new()), technique);
-        let (fans, mut rays) = (open(Technique::Fans)?, open(Technique::Raycast)?);
+        let open = |technique, choice| -> Result<Session, Box<dyn Error>> {
+            Ok(Session::open(input.volume.grid.clone(), open_backend(choice)?, technique)?)
+        };
+        let fans = open(Technique::Fans, BackendChoice::Software)?;
+        let gpu_fans = open(Technique::Fans, BackendChoice::Wgpu)?;
+        let mut rays = open(Technique::Raycast, BackendChoice::Software)?;
         let mut picture = rays.render(&view)?;
         let truth = rays.verify(&view, &mut picture, &|_| ())?;
-        Ok(Self { fans, rays, view, truth })
-    }
-
-    fn draw(
-        &mut self,
-        technique: Technique,
-        tolerance: f64,
-        thickness: Thickness,
-    ) -> Result<Timed, Box<dyn Error>> {
-        let view = View { tolerance: Some(tolerance), thickness, ..self.view.clone() };
-        let session = if technique == Technique::Fans { &mut self.fans } else { &mut self.rays };
-        let mut frames = Vec::new();
-        let mut last = session.render(&view)?;
-        for _ in 1..FRAMES {
-            last = session.render(&view)?;
-            frames.push(last.report.seconds);
-        }
-        frames.sort_by(|a, b| a.frame.total_cmp(&b.frame));
-        let seconds = frames[frames.len() / 2];
-        Ok(Timed {
-            image: last.image,
-            nodes: last.report.work.nodes,
-            triangles: last.report.work.triangles.unwrap_or_default(),
-            select: seconds.select,
-            draw: seconds.draw,
-            frame: seconds.frame,
-        })
+        Ok(Self { fans, gpu_fans, rays, view, truth })
     }
 
     fn errors(&self, timed: &Timed) -> Result<String, Box<dyn Error>> {
@@ -94,10 +96,11 @@ impl Engine {
         let [width, height] = [self.view.width, self.view.height];
         println!("### Figure 9 of the paper, again");
         println!(
-            "engine 256 x 256 x 128, {width} x {height} pixels, software backend, {} threads. The paper has 5.20 M, \
+            "engine 256 x 256 x 128, {width} x {height} pixels, {} threads; wgpu is {}. The paper has 5.20 M, \
              0.19 M and 15.8 K cubes of 256 x 256 x 110 samples by its own transfer function, and 37.5, 0.95 and \
              0.070 s.\n",
-            rayon::current_num_threads()
+            rayon::current_num_threads(),
+            self.gpu_fans.render(&self.view)?.report.backend.device,
         );
         println!(
             "| tolerance | thickness | cubes | triangles | per cube | selection s | rendering s | M cubes/s | rmse | \
@@ -107,18 +110,21 @@ impl Engine {
         for tolerance in FIGURE_9 {
             for (thickness, name) in [(Thickness::Exact, "exact"), (Thickness::Interpolated, "interpolated")]
             {
-                let timed = self.draw(Technique::Fans, tolerance, thickness)?;
-                println!(
-                    "| {} % | {name} | {} | {} | {:.2} | {:.4} | {:.4} | {:.1} | {} |",
-                    tolerance * 100.0,
-                    timed.nodes,
-                    timed.triangles,
-                    timed.triangles as f64 / timed.nodes as f64,
-                    timed.select,
-                    timed.draw,
-                    timed.nodes as f64 / timed.draw / 1e6,
-                    self.errors(&timed)?,
-                );
+                let view = View { tolerance: Some(tolerance), thickness, ..self.view.clone() };
+                let drawn = [draw(&mut self.fans, &view)?, draw(&mut self.gpu_fans, &view)?];
+                for (device, timed) in ["software", "wgpu"].iter().zip(drawn) {
+                    println!(
+                        "| {} % | {name}, {device} | {} | {} | {:.2} | {:.4} | {:.4} | {:.1} | {} |",
+                        tolerance * 100.0,
+                        timed.nodes,
+                        timed.triangles,
+                        timed.triangles as f64 / timed.nodes as f64,
+                        timed.select,
+                        timed.draw,
+                        timed.nodes as f64 / timed.draw / 1e6,
+                        self.errors(&timed)?,
+                    );
+                }
             }
         }
         self.paper()?;
@@ -155,7 +161,7 @@ impl Engine {
                 ],
                 1.0,
             )?;
-            let timed = self.draw(Technique::Fans, 0.0, Thickness::Exact)?;
+            let timed = draw(&mut self.fans, &View { tolerance: None, ..self.view.clone() })?;
             println!(
                 "| {opacity} | {} | {:.4} | {:.4} | {:.1} |",
                 timed.nodes,
@@ -178,8 +184,8 @@ impl Engine {
              |---|---|---|---|---|---|---|---|---|"
         );
         for tolerance in CURVE {
-            let fans = self.draw(Technique::Fans, tolerance, Thickness::Exact)?;
-            let rays = self.draw(Technique::Raycast, tolerance, Thickness::Exact)?;
+            let view = View { tolerance: Some(tolerance), ..self.view.clone() };
+            let [fans, rays] = [draw(&mut self.fans, &view)?, draw(&mut self.rays, &view)?];
             println!(
                 "| {:.0} % | {} | {:.1} | {} | {} | {:.1} | {} |",
                 tolerance * 100.0,

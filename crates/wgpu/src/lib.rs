@@ -19,6 +19,11 @@
 //! Cutting planes share the pool. A workgroup draws a tile of 16x16 pixels, for which the CPU has found in f64 where
 //! each plane lies; a grid of runs of bricks in Z order, or a short search in a run, tells the brick of a place.
 //!
+//! Cubes of constant matter are rendered, not traced: the vertex stage makes the fans of `volery-cubefan` from 24 bytes
+//! per cube, the fragment stage the exact length of the ray and its opacity, and blending in 32 bits lays cube over
+//! cube from back to front. On two cores llvmpipe draws 0.5 million cubes per second into 768x768 pixels (172,583 in
+//! 316 ms), two thirds of it the same in a picture of 64x64: vertices and triangles, on one thread.
+//!
 //! # Guarantees
 //! No panic: what a device refuses comes back as an error. The same frame gives the same bits on the same
 //! device.

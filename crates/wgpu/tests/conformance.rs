@@ -1,6 +1,8 @@
-//! The conformance suite of `volery-frame` on this machine's best device.
+//! The conformance suite of `volery-frame` on this machine's best device, and what only this backend's limits ask for.
 //!
 //! Without a device every test fails, unless `VOLERY_WITHOUT_GPU` is set: then all are counted as ignored.
+
+mod cubes;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use volery_frame::conformance::{ALL, Property};
@@ -11,7 +13,11 @@ fn main() {
     // One device; its memory and its threads are not to be shared.
     arguments.test_threads = Some(1);
     let without_gpu = std::env::var_os("VOLERY_WITHOUT_GPU").is_some();
-    let trials = ALL.iter().map(|&property| trial(property).with_ignored_flag(without_gpu)).collect();
+    let trials = ALL
+        .iter()
+        .chain(cubes::ALL)
+        .map(|&property| trial(property).with_ignored_flag(without_gpu))
+        .collect();
     let conclusion = libtest_mimic::run(&arguments, trials);
     if without_gpu {
         println!("ignored: {} GPU tests (VOLERY_WITHOUT_GPU)", conclusion.num_ignored);

@@ -136,13 +136,28 @@ impl Steps {
 
 by_both_backends! { engine_is_the_integral_of_its_cubes generated_volumes_are_the_integrals_of_their_cubes }
 
-fn is_the_integral(session: &mut Session, kept: &Mutex<Vec<Cube>>, view: &View, what: &str) {
+/// Largest root mean square difference from the integral: issue 4 asks for 1/255.
+const MAX_RMSE: f64 = 1e-4;
+
+/// Largest difference of any channel of any pixel. Software leaves a ray that lets 1/4096 through. A GPU puts vertices
+/// on 1/256 of a pixel and misses what is that near to an outline: of a voxel a pixel or two wide, some thousandths of
+/// its opacity; it stays below a step of the screen.
+fn max_difference(choice: BackendChoice) -> f64 {
+    if choice == BackendChoice::Software { 1.0 / 4096.0 + 2e-5 } else { 1.0 / 255.0 }
+}
+
+fn is_the_integral(
+    (session, kept): (&mut Session, &Mutex<Vec<Cube>>),
+    view: &View,
+    choice: BackendChoice,
+    what: &str,
+) {
     let picture = draw(session, view);
     let cubes = std::mem::take(&mut *kept.lock().unwrap());
     let expected = Steps::new(session.grid(), &cubes).picture(view);
     let found = distance(&format!("{what}, {} cubes", cubes.len()), &exact(&picture.image), &expected);
-    at_most("rmse", found.rmse, 1e-4);
-    at_most("largest difference", found.max, 1.0 / 4096.0 + 2e-3);
+    at_most("rmse", found.rmse, MAX_RMSE);
+    at_most("largest difference", found.max, max_difference(choice));
     let num_drawn = expected.pixels().iter().filter(|pixel| **pixel != view.background).count();
     assert!(num_drawn > 1000, "{what}: {num_drawn} pixels show something");
 }
@@ -166,7 +181,12 @@ fn engine_is_the_integral_of_its_cubes(choice: BackendChoice, test: &str) {
     ] {
         for tolerance in [0.0, 0.18] {
             let view = View { camera, tolerance: Some(tolerance), ..scene.clone() };
-            is_the_integral(&mut session, &kept, &view, &format!("{test}, {place}, tolerance {tolerance}"));
+            is_the_integral(
+                (&mut session, &kept),
+                &view,
+                choice,
+                &format!("{test}, {place}, tolerance {tolerance}"),
+            );
         }
     }
 }
@@ -202,7 +222,7 @@ fn generated_volumes_are_the_integrals_of_their_cubes(choice: BackendChoice, tes
         let view = View { width: 120, height: 90, ..whole_view(&session) };
         for tolerance in [0.0, 0.2, 2.0] {
             let view = View { tolerance: Some(tolerance), ..view.clone() };
-            is_the_integral(&mut session, &kept, &view, &format!("{name}, tolerance {tolerance}"));
+            is_the_integral((&mut session, &kept), &view, choice, &format!("{name}, tolerance {tolerance}"));
         }
     }
 }

@@ -20,8 +20,8 @@ pub struct Refinements<'a> {
 }
 
 impl Session {
-    /// Draws a view of matter again and again with ever smaller tolerances; the last picture is that of [`Session::render`], bit
-    /// for bit. Whoever moves on drops the rest.
+    /// Draws a view of matter again and again with ever smaller tolerances; the last picture is that of
+    /// [`Session::render`], bit for bit. Whoever moves on drops the rest.
     ///
     /// # Errors
     /// When the view is not meaningful.
