@@ -105,13 +105,13 @@ impl PlaneScene<'_> {
     /// The field of a channel at a place in the domain, in units of samples.
     fn field(&self, place: DVec3, channel: usize) -> Option<f64> {
         let dims = self.grid.dims();
-        let sample = |[x, y, z]: [usize; 3]| {
-            self.grid.samples().value((z * dims[1] + y) * dims[0] + x, channel)
-        };
+        let sample =
+            |[x, y, z]: [usize; 3]| self.grid.samples().value((z * dims[1] + y) * dims[0] + x, channel);
         if self.nearest {
             return Some(sample(place.to_array().map(|x| (x + 0.5 + MIDDLE_SLACK).floor() as usize)));
         }
-        let low = std::array::from_fn(|axis| (place[axis].floor() as usize).min(dims[axis].saturating_sub(2)));
+        let low =
+            std::array::from_fn(|axis| (place[axis].floor() as usize).min(dims[axis].saturating_sub(2)));
         let mut sum = 0.0;
         for corner in 0..8 {
             let mut weight = 1.0;

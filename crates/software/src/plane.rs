@@ -128,7 +128,10 @@ struct Hit<S: Simd> {
 }
 
 impl<S: Simd> Hit<S> {
-    #[expect(clippy::redundant_closure, reason = "only a closure that is written where it is passed can be inlined so")]
+    #[expect(
+        clippy::redundant_closure,
+        reason = "only a closure that is written where it is passed can be inlined so"
+    )]
     #[inline(always)]
     fn new(simd: S, plane: &PlaneTile, layout: &VolumeLayout, x: f32x16<S>, y: f32x16<S>) -> Self {
         let (a, b) = (x - plane.anchor[0], y - plane.anchor[1]);

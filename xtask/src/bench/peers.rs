@@ -55,7 +55,8 @@ pub(super) fn run(options: &Options) -> Result<(), String> {
         println!("== {name}");
         if let Some(side) = reslice::side(name) {
             let repeats = [options.frames, options.rounds];
-            let of_scene = reslice::measure((&volery, &mut vtk), (&data, &folder), side, repeats)?;
+            let of_scene =
+                reslice::measure((&volery, &mut vtk), (&data, &folder), side, repeats, &mut devices)?;
             println!("{}", table::markdown(&of_scene, &[]));
             rows.extend(of_scene);
             continue;

@@ -52,7 +52,7 @@ pub(super) fn write_scene(folder: &Path, side: u32) -> Result<(PathBuf, String),
     Ok((file, format!("{x},{y},{z},{distance}")))
 }
 
-/// Measures one size; rounds and frames as the ray-cast scenes have.
+/// Measures one size; rounds and frames as the ray-cast scenes have. Adds the devices that drew and are new.
 ///
 /// # Errors
 /// When data, VTK or Volery are missing or fail.
@@ -61,6 +61,7 @@ pub(super) fn measure(
     (data, folder): (&Path, &Path),
     side: u32,
     [frames, rounds]: [u32; 2],
+    devices: &mut Vec<String>,
 ) -> Result<Vec<Row>, String> {
     let (scene, plane) = write_scene(folder, side)?;
     let reference = volery.write_reference(&scene, data, Some(&plane))?;
@@ -74,11 +75,13 @@ pub(super) fn measure(
         vtk.reslice(frames, &mut of_vtk)?;
         for (slot, backend) in of_volery.iter_mut().zip(super::peers::BACKENDS) {
             let Some(row) = slot else { continue };
-            if let Err(error) =
-                volery.draw((&scene, data), (backend, frames), &plane_options, round == 0, row)
-            {
-                println!("{error}: left out");
-                *slot = None;
+            match volery.draw((&scene, data), (backend, frames), &plane_options, round == 0, row) {
+                Ok(device) if devices.contains(&device) => {}
+                Ok(device) => devices.push(device),
+                Err(error) => {
+                    println!("{error}: left out");
+                    *slot = None;
+                }
             }
         }
     }

@@ -113,6 +113,8 @@ class Plane:
         self.reslice.SetResliceAxes(axes)
         self.reslice.SetOutputDimensionality(2)
         self.reslice.SetInterpolationModeToLinear()
+        # Else it goes on for half a voxel beyond the samples.
+        self.reslice.BorderOff()
         self.reslice.SetOutputSpacing(pixel, pixel, 1)
         self.reslice.SetOutputExtent(0, width - 1, 0, height - 1, 0, 0)
         self.reslice.SetOutputOrigin(-(width - 1) / 2 * pixel, -(height - 1) / 2 * pixel, 0)
