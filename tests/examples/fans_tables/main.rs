@@ -4,6 +4,8 @@
 //! medians of the frames after the first, of the software backend where nothing else is said; errors are against the
 //! picture in f64 of the trilinear field between the samples.
 
+mod opacity;
+
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -29,7 +31,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: fans_tables DATA PICTURES".into());
     };
     head(pictures)?;
-    Engine::open(data)?.tables()
+    Engine::open(data)?.tables()?;
+    opacity::tables();
+    Ok(())
 }
 
 /// One picture, with its times in seconds.
