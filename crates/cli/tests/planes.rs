@@ -99,6 +99,18 @@ fn what_is_seen_changes_with_every_option() {
 }
 
 #[test]
+fn fans_say_how_they_found_lengths() {
+    let shop = Workshop::new();
+    let line = "render waves.nrrd --size 40x30 --backend software --technique fans --view 30,20,3";
+    shop.done(&format!("{line} -o a.exr --report a.json"));
+    shop.done(&format!("{line} -o b.exr --report b.json --thickness interpolated"));
+    assert_eq!(shop.json("a.json")["thickness"], "exact");
+    assert_eq!(shop.json("b.json")["thickness"], "interpolated");
+    assert!(shop.json("a.json")["work"]["triangles"].as_u64() > Some(0));
+    assert!(shop.bytes("a.exr") != shop.bytes("b.exr"), "in perspective the two differ");
+}
+
+#[test]
 fn matter_is_coarse_first() {
     let shop = Workshop::new();
     for technique in ["raycast", "fans"] {

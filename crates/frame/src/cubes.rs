@@ -46,6 +46,16 @@ pub enum Thickness {
     Interpolated,
 }
 
+impl Thickness {
+    /// Its name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Interpolated => "interpolated",
+        }
+    }
+}
+
 impl Cube {
     /// Lower and upper corner on the lattice: twice the finest-sample coordinates.
     #[inline]

@@ -9,8 +9,11 @@ use serde::Serialize;
 pub struct Report {
     /// What was drawn.
     pub input: Input,
-    /// How: `raycast`, `plane`.
+    /// How: `raycast`, `plane`, `fans`.
     pub technique: &'static str,
+    /// Of fans, how lengths in cubes were found: `exact` or `interpolated`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<&'static str>,
     /// By whom.
     pub backend: Backend,
     /// Size of the picture.

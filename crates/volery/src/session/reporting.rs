@@ -32,6 +32,7 @@ impl Session {
                 scalar: self.grid.sample_type().name(),
             },
             technique: self.technique.name(),
+            thickness: matches!(plan, Plan::Cubes(_)).then(|| view.thickness.name()),
             backend: report::Backend {
                 kind: match device.kind {
                     DeviceKind::Software => "software",
