@@ -115,7 +115,7 @@ impl Filter for Frustum<'_> {
 /// A plane that touches a box in a corner, an edge or a face meets it. So does one that passes within
 /// [`PLANE_SLACK`] of the domain's size: who draws finds the places of a plane in `f32`, perhaps just across a
 /// boundary, and there must be no hole. What each node has of the plane, without overlaps, says
-/// [`section`](crate::section). A plane with [defects](Plane::defects) is met by nothing.
+/// [`section`](crate::section()). A plane with [defects](Plane::defects) is met by nothing.
 pub struct CuttingPlanes<'a> {
     layout: &'a Layout,
     /// Each with the offset below which it meets a box.

@@ -88,7 +88,7 @@ impl ColorChange {
         // Up to an error of the whole range, beyond which nothing new comes.
         let octaves = ((edges[edges.len() - 1] - edges[0]) / value_slack).log2();
         let mut num_steps = (octaves * STEPS_PER_OCTAVE).ceil() as usize + 2;
-        if !(octaves < 64.0) {
+        if octaves.is_nan() || octaves >= 64.0 {
             // A range that is empty or overflows has no bins.
             (edges, num_steps) = (vec![0.0; 2], 0);
         }
@@ -146,8 +146,7 @@ impl ColorChange {
 /// opacity times the largest distance of the colour from any light. Infinite where an error is, and where there
 /// are no three channels.
 pub fn largest_of_colors(stats: &[NodeStats], is_transparent: bool) -> f64 {
-    let [colors @ ..] = stats;
-    let (Some(colors), opacity) = (colors.get(..3), colors.get(3)) else { return f64::INFINITY };
+    let (Some(colors), opacity) = (stats.get(..3), stats.get(3)) else { return f64::INFINITY };
     let worst = colors.iter().map(|color| {
         let (error, farthest) = (color.error / 255.0, color.max.max(255.0 - color.min) / 255.0);
         match opacity.filter(|_| is_transparent) {

@@ -171,7 +171,7 @@ fn leaving_out_the_unseen_keeps_cover_and_balance() {
     for seed in 0..30 {
         let cut = balance(&layout, &crate::world::random_cut(&layout, seed));
         let mut unseen = |node: Node| {
-            if node.index[0] % 3 == 0 || noise.unit() < 0.2 { Answer::Skip } else { Answer::Descend }
+            if node.index[0].is_multiple_of(3) || noise.unit() < 0.2 { Answer::Skip } else { Answer::Descend }
         };
         let seen = without_unseen(&cut, &mut unseen);
         assert_eq!(defects(&layout, &seen), []);

@@ -52,7 +52,7 @@ fn derived_area(size: DVec3, plane: &Plane) -> f64 {
     let normal = normal.abs();
     let corner = |corner: u32| {
         let at = DVec3::from_array([0, 1, 2].map(|axis| f64::from(corner >> axis & 1) * size[axis]));
-        let sign = if corner.count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if corner.count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
         sign * (distance - normal.dot(at)).max(0.0).powi(2)
     };
     (0..8).map(corner).sum::<f64>() / (2.0 * normal.element_product())

@@ -118,6 +118,9 @@ fn hounsfield(points: &[HounsfieldPoint]) -> Vec<ControlPoint> {
 
 /// Grey from black to white over a range of values, opacity as well: how planes are shown where nobody says
 /// otherwise.
+///
+/// # Panics
+/// When the range is not of finite values, or falls.
 pub fn gray([low, high]: [f64; 2], extent: DVec3) -> TransferFunction {
     let point = |value, level| ControlPoint { value, color: [level; 3], opacity: level };
     TransferFunction::new(vec![point(low, 0.0), point(high, 1.0)], unit_distance(extent))
