@@ -276,9 +276,19 @@ fn sheet(pictures: &[Image]) -> Image {
     Image { width: sheet_width, height: sheet_height, pixels }
 }
 
+/// An image as fine as a fur: rings and tiles under as much white noise.
+fn grained(side: usize) -> Result<VoxelGrid, Box<dyn Error>> {
+    let (plate, noise) = (volery_data::zone_plate([side; 2]), volery_data::noise([side, side, 1], 6));
+    let value = |place: usize, channel: usize| {
+        ((plate.samples().value(place, channel) + noise.samples().value(place, 0)) / 2.0) as u8
+    };
+    let colors: Vec<[u8; 3]> = (0..side * side).map(|place| [0, 1, 2].map(|c| value(place, c))).collect();
+    Ok(VoxelGrid::new([side, side, 1], DVec3::ONE, colors)?)
+}
+
 /// Figure 6 of the paper, on a generated image: without blending, node boundaries, nearest, linear.
 fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
-    let grid = volery_data::zone_plate([512, 512]);
+    let grid = grained(512)?;
     let blended = || -> Box<dyn Backend> { Box::new(SoftwareBackend::new()) };
     let torn: Box<dyn Backend> = Box::new(Unblended(SoftwareBackend::new()));
     let rows = [
@@ -290,10 +300,10 @@ fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut pictures = Vec::new();
     for (backend, sampling, shows_nodes) in rows {
         let mut session = Session::open(grid.clone(), backend, Technique::Plane)?;
-        let mut view = session.view(&ViewOptions { width: 300, height: 300, ..ViewOptions::default() });
-        view.planes.focus = Some(Focus { point: DVec3::new(290.0, 290.0, 0.0), quality: 0.5 });
+        let mut view = session.view(&ViewOptions { width: 340, height: 340, ..ViewOptions::default() });
+        view.planes.focus = Some(Focus { point: DVec3::new(285.0, 285.0, 0.0), quality: 0.6 });
         (view.planes.sampling, view.planes.shows_nodes) = (sampling, shows_nodes);
-        let target = DVec3::new(360.0, 360.0, 0.0);
+        let target = DVec3::new(335.0, 335.0, 0.0);
         let projection = Projection::Orthographic { height: 160.0 };
         view.camera = Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection };
         pictures.push(session.render(&view)?.image);
