@@ -300,7 +300,7 @@ fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut pictures = Vec::new();
     for (backend, sampling, shows_nodes) in rows {
         let mut session = Session::open(grid.clone(), backend, Technique::Plane)?;
-        let mut view = session.view(&ViewOptions { width: 340, height: 340, ..ViewOptions::default() });
+        let mut view = session.view(&ViewOptions { width: 320, height: 320, ..ViewOptions::default() });
         view.planes.focus = Some(Focus { point: DVec3::new(285.0, 285.0, 0.0), quality: 0.6 });
         (view.planes.sampling, view.planes.shows_nodes) = (sampling, shows_nodes);
         let target = DVec3::new(335.0, 335.0, 0.0);
