@@ -1,5 +1,6 @@
 //! Techniques: from a scene and its dials to a frame that any backend draws.
 
+mod cells;
 pub mod fans;
 pub mod parts;
 pub mod plane;

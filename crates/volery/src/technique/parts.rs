@@ -16,6 +16,7 @@ use volery_octree::{Answer, CuttingPlanes, Filter};
 use volery_pyramid::{Kind, Layout, Node, NodeSource, NodeStats, Pyramid};
 use volery_scene::{Plane, VoxelGrid};
 
+use super::cells::Cells;
 use super::plane::BRICK_CELLS;
 
 /// Cells of a part per axis.
@@ -26,6 +27,7 @@ const PARTS: u32 = (BRICK_CELLS / CELLS) as u32;
 
 /// Statistics of the parts of all nodes above level 0.
 pub(crate) struct Parts {
+    grid: VoxelGrid,
     /// That of the pyramid whose nodes are the parts.
     layout: Layout,
     num_channels: usize,
@@ -42,7 +44,7 @@ impl Parts {
         let of_level =
             |level| layout.level_nodes(level).flat_map(|part| pyramid.stats(part)).copied().collect();
         let levels = (1..layout.num_levels()).map(of_level).collect();
-        Self { layout, num_channels: grid.sample_type().channels(), levels }
+        Self { grid: grid.clone(), layout, num_channels: grid.sample_type().channels(), levels }
     }
 
     /// The parts that planes meet of a node.
@@ -55,6 +57,18 @@ impl Parts {
         };
         let is_met = move |part: &Node| self.layout.contains(*part) && planes.answer(*part) != Answer::Skip;
         (0..PARTS.pow(3)).map(part).filter(is_met)
+    }
+
+    /// The finest cells that planes meet.
+    pub(crate) fn cells(&self, planes: &[Plane]) -> Cells<'_> {
+        Cells::new(&self.grid, &self.layout, planes)
+    }
+
+    /// The finest cells of a part, from the first to behind the last.
+    pub(crate) fn cell_box(&self, part: Node) -> [[usize; 3]; 2] {
+        let dims = self.grid.dims();
+        let end = |i: u32, axis: usize| ((i as usize * CELLS) << part.level).min((dims[axis] - 1).max(1));
+        [0, 1].map(|upper| std::array::from_fn(|axis| end(part.index[axis] + upper, axis)))
     }
 
     /// The statistics of a part, one per channel; none at level 0.

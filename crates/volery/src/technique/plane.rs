@@ -39,6 +39,9 @@ use crate::texels::Encoding;
 /// Cells of a brick per axis: high tiles of 31 samples, low ones of 16, as in the paper.
 pub const BRICK_CELLS: usize = 30;
 
+/// Finest cells that are looked at for the bound of a picture, about: some tens of milliseconds.
+const MAX_CELLS: usize = 1 << 15;
+
 /// What one frame draws.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -58,8 +61,7 @@ impl Plan {
         let layout = source.layout();
         let low_corners = low_corners(layout, &cut);
         let colors = ColorBounds::new(source, parts, view);
-        let bound = |(&node, &low_corners): (&Node, &u8)| colors.of_node(node, low_corners);
-        let bound_max = cut.nodes.iter().zip(&low_corners).map(bound).fold(0.0, f64::max);
+        let bound_max = colors.of_cut(&cut.nodes, &low_corners);
         let planes: Vec<_> = view.planes.planes.iter().map(|plane| IndexPlane::new(layout, plane)).collect();
         let polygons =
             |node: &Node| planes.iter().filter(|plane| !section(layout, *node, plane).is_empty()).count();
@@ -166,6 +168,40 @@ impl<'a> ColorBounds<'a> {
     fn data_error(&self, node: Node) -> f64 {
         let errors = self.source.stats(node).iter().map(|channel| channel_error(channel, self.sampling));
         if node.level == 0 { 0.0 } else { errors.fold(0.0, f64::max) }
+    }
+
+    /// Of a picture.
+    ///
+    /// With parts, the worst of them are looked at in their finest cells, until the worst that is left is no worse
+    /// than those were, or too much was read.
+    fn of_cut(&self, nodes: &[Node], low_corners: &[u8]) -> f64 {
+        let drawn = nodes.iter().copied().zip(low_corners.iter().copied());
+        let parts = match self.parts {
+            Some(parts) if self.sampling == Sampling::Linear => parts,
+            _ => return drawn.map(|(node, low)| self.of_node(node, low)).fold(0.0, f64::max),
+        };
+        let met = drawn.flat_map(|(node, low)| {
+            parts.met(node, self.planes).map(move |part| (self.of_part(parts, part, low), part, node, low))
+        });
+        let mut met: Vec<_> = met.collect();
+        met.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let cells = parts.cells(self.planes);
+        let (mut largest, mut num_read) = (0.0_f64, 0);
+        for (bound, part, node, low) in met {
+            if bound <= largest {
+                break;
+            }
+            if num_read > MAX_CELLS {
+                largest = bound;
+                break;
+            }
+            let mut of_cells = 0.0_f64;
+            num_read += cells.visit(node, low, parts.cell_box(part), |stats| {
+                of_cells = of_cells.max(self.of_channels(stats));
+            });
+            largest = largest.max(of_cells.min(bound));
+        }
+        (self.num_layers * largest).min(1.0)
     }
 
     /// Of a node that shows its own samples, and its parent's at some corners.

@@ -9,7 +9,7 @@ use volery_tests::{at_most, data_folder, draw, exact};
 use super::{ENGINE, MOUSE, MRI, Random, colors, read, software};
 
 /// Largest errors to ask for, in turn.
-const ERRORS: [f64; 4] = [0.05, 0.1, 0.2, 0.3];
+const ERRORS: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
 
 const NUM_PLANES: usize = 200;
 
@@ -66,17 +66,16 @@ fn ratios(name: &str, data: &Path) -> Vec<f64> {
 }
 
 /// No pixel of 200 planes through each volume is farther off than the bound, and no bound is above what was asked
-/// for. Half of all bounds are within 3 times the measured maximum; not so those of the MRI head alone: where its
-/// air is dark but for specks, the bound is that of a speck beside the plane.
+/// for. Half of the bounds of each volume are within 3 times the measured maximum.
 #[test]
 fn real_data_keep_their_bound_and_it_is_tight() {
     let test = "real_data_keep_their_bound_and_it_is_tight";
     let Some(data) = data_folder(test) else { return };
     let mut all = Vec::new();
-    for (name, threshold) in [(ENGINE, 3.0), (MOUSE, 3.0), (MRI, 8.0)] {
+    for name in [ENGINE, MOUSE, MRI] {
         let of_volume = ratios(name, &data);
         let what = format!("{name}: median bound / measured of {} planes that differ", of_volume.len());
-        at_most(&what, median(of_volume.clone()), threshold);
+        at_most(&what, median(of_volume.clone()), 3.0);
         all.extend(of_volume);
     }
     assert!(all.len() > 2 * NUM_PLANES, "only {} pictures differ from the full resolution", all.len());
@@ -106,6 +105,7 @@ fn every_picture_keeps_the_bound_that_it_reports() {
             let focus = Focus { point: random.point(extent), quality };
             view.planes.focus = (number % 6 != 0).then_some(focus);
             view.tolerance = (number % 6 == 0 || number % 11 == 0).then(|| random.between(0.01, 0.4));
+            view.planes.max_error = (number % 5 < 2).then(|| random.between(0.02, 0.4));
             let (measured, bound) = largest_difference(&mut session, &view);
             assert!(measured <= bound, "{name}, {number}: measured {measured}, bound {bound}, {view:?}");
             closest = closest.min(bound / measured);
