@@ -138,14 +138,20 @@ impl<'a> CuttingPlanes<'a> {
     }
 }
 
-impl Filter for CuttingPlanes<'_> {
-    fn answer(&mut self, node: Node) -> Answer {
-        let bounds = self.layout.bounds(node);
+impl CuttingPlanes<'_> {
+    /// Whether a plane meets a box, in finest-sample coordinates.
+    pub fn may_meet(&self, bounds: [DVec3; 2]) -> bool {
         let misses = |&(plane, slack): &(IndexPlane, f64)| {
             let [least, greatest] = plane.offsets(bounds);
             least > slack || greatest < -slack
         };
-        if self.planes.iter().all(misses) { Answer::Skip } else { Answer::Draw }
+        !self.planes.iter().all(misses)
+    }
+}
+
+impl Filter for CuttingPlanes<'_> {
+    fn answer(&mut self, node: Node) -> Answer {
+        if self.may_meet(self.layout.bounds(node)) { Answer::Draw } else { Answer::Skip }
     }
 }
 

@@ -5,14 +5,11 @@
 //! Planes are composed front to back along each ray, so that those which cut one another hide one another right;
 //! at equal distance the one listed first is in front.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use glam::DVec3;
-use rayon::prelude::*;
 use volery_scene::{Camera, Plane, Ray, SampleType, TransferFunction, VoxelGrid};
 
 use crate::image::Image;
-use crate::render::{Error, check_picture};
+use crate::render::{Error, picture};
 
 /// Distance beyond the domain's faces, relative to the reach of the scene, that counts as on them: a plane that
 /// coincides with a face is seen in spite of rounding.
@@ -46,21 +43,10 @@ impl PlaneScene<'_> {
         &self,
         camera: &Camera,
         background: [f64; 3],
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Image, Error> {
-        check_picture(camera, width, height)?;
-        let rays = camera.rays(width, height);
-        let num_done = AtomicU32::new(0);
-        let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
-        pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row_pixels, row)| {
-            for (pixel, column) in row_pixels.iter_mut().zip(0..width) {
-                *pixel = self.trace(&rays.pixel(column, row), background);
-            }
-            let done = num_done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(f64::from(done) / f64::from(height));
-        });
-        Ok(Image::of_all_pixels(width, height, pixels))
+        picture(camera, size, progress, |ray| self.trace(ray, background))
     }
 
     /// What one ray sees.

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
-use volery_scene::{Camera, SampleType, TransferFunction, VoxelGrid, camera};
+use volery_scene::{Camera, Ray, SampleType, TransferFunction, VoxelGrid, camera};
 
 use crate::image::Image;
 use crate::tracer::Tracer;
@@ -52,8 +52,13 @@ pub fn render(
     Tracer::new(grid, transfer)?.render(camera, background, width, height, &|_| {})
 }
 
-/// Whether a picture can be taken.
-pub(crate) fn check_picture(camera: &Camera, width: u32, height: u32) -> Result<(), Error> {
+/// What each pixel's ray sees, row by row on all threads.
+pub(crate) fn picture(
+    camera: &Camera,
+    [width, height]: [u32; 2],
+    progress: &(dyn Fn(f64) + Sync),
+    trace: impl Fn(&Ray) -> [f64; 3] + Sync,
+) -> Result<Image, Error> {
     let defects = camera.defects();
     if !defects.is_empty() {
         return Err(Error::Camera { defects });
@@ -61,7 +66,17 @@ pub(crate) fn check_picture(camera: &Camera, width: u32, height: u32) -> Result<
     if !(1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) {
         return Err(Error::Size { width, height });
     }
-    Ok(())
+    let rays = camera.rays(width, height);
+    let num_done = AtomicU32::new(0);
+    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+    pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row_pixels, row)| {
+        for (pixel, column) in row_pixels.iter_mut().zip(0..width) {
+            *pixel = trace(&rays.pixel(column, row));
+        }
+        let done = num_done.fetch_add(1, Ordering::Relaxed) + 1;
+        progress(f64::from(done) / f64::from(height));
+    });
+    Ok(Image::of_all_pixels(width, height, pixels))
 }
 
 impl Tracer<'_> {
@@ -78,17 +93,6 @@ impl Tracer<'_> {
         height: u32,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Image, Error> {
-        check_picture(camera, width, height)?;
-        let rays = camera.rays(width, height);
-        let num_done = AtomicU32::new(0);
-        let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
-        pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row_pixels, row)| {
-            for (pixel, column) in row_pixels.iter_mut().zip(0..width) {
-                *pixel = self.trace(&rays.pixel(column, row)).over(background);
-            }
-            let done = num_done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(f64::from(done) / f64::from(height));
-        });
-        Ok(Image::of_all_pixels(width, height, pixels))
+        picture(camera, [width, height], progress, |ray| self.trace(ray).over(background))
     }
 }

@@ -4,5 +4,6 @@
 
 mod against_marching;
 mod closed_forms;
+mod planes;
 mod requests;
 mod slow;

@@ -6,42 +6,33 @@
 //! pixels can show and little more; it reads samples where statistics do not, so it is for the worst parts alone.
 
 use glam::DVec3;
-use volery_octree::IndexPlane;
-use volery_octree::filters::PLANE_SLACK;
+use volery_octree::CuttingPlanes;
 use volery_octree::section::ratio;
 use volery_pyramid::{Layout, Node, NodeStats};
 use volery_scene::{Plane, VoxelGrid};
 
-use super::plane::BRICK_CELLS;
+use super::plane::{BRICK_CELLS, mix};
 
 /// The finest cells that planes meet.
 pub(crate) struct Cells<'a> {
     grid: &'a VoxelGrid,
-    /// Each with the offset below which it meets a box.
-    planes: Vec<(IndexPlane, f64)>,
+    planes: CuttingPlanes<'a>,
 }
 
-/// The range of values that a cell shows, and how far they are off, per channel.
-pub(crate) type CellStats<'a> = &'a [NodeStats];
-
 impl<'a> Cells<'a> {
-    pub(crate) fn new(grid: &'a VoxelGrid, layout: &Layout, planes: &[Plane]) -> Self {
-        let with_slack = |plane: &Plane| {
-            let index_plane = IndexPlane::new(layout, plane);
-            let [least, greatest] = index_plane.offsets([DVec3::ZERO, layout.domain()]);
-            (index_plane, PLANE_SLACK * (greatest - least) + 1e-14 * plane.distance.abs())
-        };
-        Self { grid, planes: planes.iter().map(with_slack).collect() }
+    pub(crate) fn new(grid: &'a VoxelGrid, layout: &'a Layout, planes: &[Plane]) -> Self {
+        Self { grid, planes: CuttingPlanes::new(layout, planes) }
     }
 
     /// Visits the cells that planes meet in the box `[low, high)` of cells, which lies in `node` as it is drawn with
-    /// these low corners. Returns how many.
+    /// these low corners: the range of values that a cell shows, and how far they are off, per channel. Returns how
+    /// many.
     pub(crate) fn visit(
         &self,
         node: Node,
         low_corners: u8,
         [low, high]: [[usize; 3]; 2],
-        mut take: impl FnMut(CellStats<'_>),
+        mut take: impl FnMut(&[NodeStats]),
     ) -> usize {
         let mut stats =
             vec![
@@ -54,11 +45,7 @@ impl<'a> Cells<'a> {
                 for x in low[0]..high[0] {
                     let ends = [[x, y, z], self.upper([x, y, z])];
                     let corners = ends.map(|corner| DVec3::from_array(corner.map(|i| i as f64)));
-                    let meets = |(plane, slack): &(IndexPlane, f64)| {
-                        let [least, greatest] = plane.offsets(corners);
-                        least <= *slack && greatest >= -slack
-                    };
-                    if self.planes.iter().any(meets) {
+                    if self.planes.may_meet(corners) {
                         self.measure(node, low_corners, ends, &mut stats);
                         take(&stats);
                         num_met += 1;
@@ -87,7 +74,7 @@ impl<'a> Cells<'a> {
             shares.iter().fold([1.0_f64, 0.0_f64], |[a, b], &share| [a.min(share), b.max(share)]);
         for (channel, stats) in stats.iter_mut().enumerate() {
             let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
-            let mut off = [0.0_f64; 2];
+            let (mut high_off, mut low_off) = (0.0_f64, 0.0_f64);
             for vertex in vertices {
                 let finest = self.level(0, vertex, channel);
                 let mut include = |value: f64| {
@@ -97,13 +84,13 @@ impl<'a> Cells<'a> {
                 };
                 include(finest);
                 if least < 1.0 {
-                    off[0] = off[0].max(include(self.level(node.level, vertex, channel)));
+                    high_off = high_off.max(include(self.level(node.level, vertex, channel)));
                 }
                 if most > 0.0 {
-                    off[1] = off[1].max(include(self.level(node.level + 1, vertex, channel)));
+                    low_off = low_off.max(include(self.level(node.level + 1, vertex, channel)));
                 }
             }
-            let error = mix(off, least).max(mix(off, most));
+            let error = mix(high_off, low_off, least).max(mix(high_off, low_off, most));
             *stats = NodeStats { min, max, error, ..*stats };
         }
     }
@@ -128,14 +115,5 @@ impl<'a> Cells<'a> {
             }
         }
         sum
-    }
-}
-
-/// The first and, as `ratio` rises to 1, the second; either may be infinite.
-fn mix([own, low]: [f64; 2], ratio: f64) -> f64 {
-    match ratio {
-        0.0 => own,
-        1.0 => low,
-        _ => own * (1.0 - ratio) + low * ratio,
     }
 }

@@ -261,7 +261,7 @@ impl<'a> ColorBounds<'a> {
 }
 
 /// What is `own` and, as `ratio` rises to 1, `low`; either may be infinite.
-fn mix(own: f64, low: f64, ratio: f64) -> f64 {
+pub(super) fn mix(own: f64, low: f64, ratio: f64) -> f64 {
     if ratio <= 0.0 {
         own
     } else if ratio >= 1.0 {
