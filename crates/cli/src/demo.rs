@@ -145,5 +145,5 @@ impl Sheet<'_> {
 }
 
 fn file_name(folder: &Path, name: &str, title: &str) -> PathBuf {
-    folder.join(format!("{name}-{}.png", title.replace(' ', "-").replace(',', "")))
+    folder.join(format!("{name}-{}.png", title.replace(". ", " ").replace(' ', "-").replace(',', "")))
 }

@@ -33,6 +33,7 @@ use volery_frame::{Cube, Cubes, Frame, Thickness, VolumeLayout};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::math::{axes, opacity_of_depth};
+use crate::tile::{TILE, assembled};
 use bins::Bins;
 use fan_raster::Raster;
 use view::{PacketRays, View};
@@ -43,8 +44,7 @@ const PACKET: u32 = 4;
 /// Packets of a tile per axis: a tile's packets are the bits of a `u64`.
 const TILE_PACKETS: u32 = 8;
 
-/// Pixels of a tile per axis.
-const TILE: u32 = PACKET * TILE_PACKETS;
+const _: () = assert!(TILE == PACKET * TILE_PACKETS, "packets fill a tile");
 
 const NUM_PACKETS: usize = (TILE_PACKETS * TILE_PACKETS) as usize;
 
@@ -68,15 +68,7 @@ pub(crate) fn draw(
             |tile| dispatch!(level, simd => draw_tile(simd, &shared, tile, [tile % columns, tile / columns])),
         )
         .collect();
-    let mut pixels = Vec::with_capacity(frame.width as usize * frame.height as usize);
-    for y in 0..frame.height {
-        for x in (0..frame.width).step_by(TILE as usize) {
-            let tile = &tiles[(y / TILE * columns + x / TILE) as usize];
-            let start = (y % TILE * TILE) as usize;
-            pixels.extend_from_slice(&tile[start..start + (frame.width - x).min(TILE) as usize]);
-        }
-    }
-    pixels
+    assembled(frame, &tiles)
 }
 
 /// All that tiles share.

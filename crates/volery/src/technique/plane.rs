@@ -58,9 +58,12 @@ pub struct Plan {
 impl Plan {
     /// The plan of a valid cut whose nodes, drawn and skipped, are balanced.
     pub(crate) fn of(source: &dyn NodeSource, parts: Option<&Parts>, view: &View, cut: Cut) -> Self {
-        let layout = source.layout();
+        Self::with_bounds(&ColorBounds::new(source, parts, view), view, cut)
+    }
+
+    fn with_bounds(colors: &ColorBounds<'_>, view: &View, cut: Cut) -> Self {
+        let layout = colors.source.layout();
         let low_corners = low_corners(layout, &cut);
-        let colors = ColorBounds::new(source, parts, view);
         let bound_max = colors.of_cut(&cut.nodes, &low_corners);
         let planes: Vec<_> = view.planes.planes.iter().map(|plane| IndexPlane::new(layout, plane)).collect();
         let polygons =
@@ -112,7 +115,7 @@ pub(crate) fn plan(
         // All of one level: balanced as it is.
         select(layout, (seen, |_: Node| Answer::Descend))
     };
-    Plan::of(source, parts, view, cut)
+    Plan::with_bounds(&colors, view, cut)
 }
 
 /// How much of what is allowed an error uses up; none is ever small enough for an allowance of 0.
