@@ -1,6 +1,6 @@
 //! The trait of executors.
 
-use crate::{Brick, BrickId, Content, Frame, TexelType, VolumeLayout, planes};
+use crate::{Brick, BrickId, Content, Frame, TexelType, VolumeLayout, planes, sheets};
 
 /// A picture in linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,6 +127,16 @@ pub enum DrawError {
         /// Everything that is wrong with it.
         defects: String,
     },
+    /// Sheets that do not fit together.
+    #[error("draw: {what} of sheets is {found}, expected {expected}")]
+    Sheets {
+        /// Which number.
+        what: &'static str,
+        /// What it is.
+        found: String,
+        /// What it may be.
+        expected: String,
+    },
     /// The device failed.
     #[error("device: {0}")]
     Device(String),
@@ -162,20 +172,24 @@ pub trait Backend: Send {
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError>;
 }
 
-/// Checks that every backend makes before it draws: size, placement of bricks, planes, and whether the texels are
-/// what the content needs.
+/// Checks that every backend makes before it draws: size, placement of bricks, planes, sheets, and whether there is a
+/// volume with the texels that the content needs.
 ///
 /// # Errors
-/// [`DrawError::Size`], [`DrawError::Misplaced`], [`DrawError::RaysThroughColors`], [`DrawError::TooManyPlanes`] or
-/// [`DrawError::Plane`].
-pub fn check_frame(frame: &Frame<'_>, layout: &VolumeLayout, max_size: u32) -> Result<(), DrawError> {
+/// [`DrawError::Size`], [`DrawError::NoVolume`], [`DrawError::Misplaced`], [`DrawError::RaysThroughColors`],
+/// [`DrawError::TooManyPlanes`], [`DrawError::Plane`] or [`DrawError::Sheets`].
+pub fn check_frame(frame: &Frame<'_>, layout: Option<&VolumeLayout>, max_size: u32) -> Result<(), DrawError> {
     let (width, height) = (frame.width, frame.height);
     if !(1..=max_size).contains(&width) || !(1..=max_size).contains(&height) {
         return Err(DrawError::Size { width, height, max: max_size });
     }
+    if let Content::Sheets(content) = &frame.content {
+        return sheets::check(content);
+    }
+    let layout = layout.ok_or(DrawError::NoVolume)?;
     match &frame.content {
         Content::Rays(_) if layout.texel == TexelType::Rgba8 => return Err(DrawError::RaysThroughColors),
-        Content::Rays(_) | Content::Cubes(_) => {}
+        Content::Rays(_) | Content::Cubes(_) | Content::Sheets(_) => {}
         Content::Planes(content) => planes::check(content.planes)?,
     }
     for brick in frame.content.bricks() {

@@ -29,6 +29,7 @@ pub mod cubes;
 pub mod integral;
 pub mod plane_tiles;
 pub mod planes;
+pub mod sheets;
 
 pub use backend::{Backend, Device, DeviceKind, DrawError, Drawn, Image, UploadError};
 pub use brick::{Brick, BrickId, PlacedBrick, TexelType, Texels, VolumeLayout};
@@ -37,8 +38,9 @@ pub use cubes::{Cube, Cubes, Thickness};
 pub use integral::IntegratedTransfer;
 pub use plane_tiles::{PlaneTile, PlaneTiles};
 pub use planes::{BlendedBrick, Planes, PointTransfer, Sampling};
+pub use sheets::{Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets};
 
-use volery_scene::Camera;
+use volery_scene::{Camera, TriangleMesh};
 
 /// One picture to draw of the volume that a backend holds.
 #[derive(Clone, Debug)]
@@ -51,6 +53,8 @@ pub struct Frame<'a> {
     pub camera: Camera,
     /// Linear RGB behind everything.
     pub background: [f32; 3],
+    /// Opaque surfaces among the content: they hide what is behind them, and matter in front veils them.
+    pub meshes: &'a [TriangleMesh],
     /// What is to be seen.
     pub content: Content<'a>,
 }
@@ -64,6 +68,8 @@ pub enum Content<'a> {
     Planes(Planes<'a>),
     /// Cubes of constant colour and extinction.
     Cubes(Cubes<'a>),
+    /// Slices through matter, each standing for a slab of it.
+    Sheets(Sheets<'a>),
 }
 
 impl Content<'_> {
@@ -72,7 +78,7 @@ impl Content<'_> {
         let (rays, planes): (&[PlacedBrick], &[BlendedBrick]) = match self {
             Self::Rays(rays) => (rays.bricks, &[]),
             Self::Planes(planes) => (&[], planes.bricks),
-            Self::Cubes(_) => (&[], &[]),
+            Self::Cubes(_) | Self::Sheets(_) => (&[], &[]),
         };
         rays.iter().chain(planes.iter().map(|brick| &brick.placed))
     }

@@ -262,7 +262,8 @@ mod tests {
                     .map(|n| Plane::through(extent * 0.47, DVec3::from_array(n) / spacing))
                     .into();
                 let content = Content::Rays(Rays { transfer: &transfer, bricks: &[] });
-                let frame = Frame { width: 512, height: 384, camera, background: [0.0; 3], content };
+                let frame =
+                    Frame { width: 512, height: 384, camera, background: [0.0; 3], meshes: &[], content };
                 let tiles = PlaneTiles::new(&frame, &planes, &layout);
                 let rays = camera.rays(512, 384);
                 for (column, row) in
@@ -317,7 +318,8 @@ mod tests {
                 let transfer = TransferFunction::new(vec![point], 1.0).unwrap();
                 let transfer = IntegratedTransfer::new(&transfer, [0.0, 1.0], 1.0);
                 let content = Content::Rays(Rays { transfer: &transfer, bricks: &[] });
-                let frame = Frame { width: 16, height: 16, camera: view, background: [0.0; 3], content };
+                let frame =
+                    Frame { width: 16, height: 16, camera: view, background: [0.0; 3], meshes: &[], content };
                 for (distance, place) in [(0.0, 0.0), (extent, f64::from(cells))] {
                     let planes = [Plane { normal: DVec3::Y, distance }];
                     let tiles = PlaneTiles::new(&frame, &planes, &layout);

@@ -1,5 +1,5 @@
-//! What Volery draws and from where: a [`VoxelGrid`] or an [`UnstructuredGrid`], a [`Camera`], a
-//! [`TransferFunction`].
+//! What Volery draws and from where: a [`VoxelGrid`] or an [`UnstructuredGrid`], a
+//! [`TriangleMesh`], a [`Camera`], a [`TransferFunction`].
 //!
 //! Plain data and its validation, in `f64`; every other crate of Volery speaks in these types.
 //!
@@ -16,6 +16,7 @@
 
 pub mod camera;
 pub mod grid;
+pub mod mesh;
 pub mod plane;
 pub mod samples;
 pub mod transfer;
@@ -23,6 +24,7 @@ pub mod unstructured;
 
 pub use camera::{Camera, Projection, Ray, RayGrid};
 pub use grid::VoxelGrid;
+pub use mesh::TriangleMesh;
 pub use plane::Plane;
 pub use samples::{Array, Sample, SampleType, Samples};
 pub use transfer::{ControlPoint, TransferFunction};

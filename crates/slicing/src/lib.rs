@@ -36,6 +36,7 @@
 mod adaptive;
 mod buckets;
 mod cut;
+mod mesh;
 mod planes;
 mod section;
 mod slicer;
@@ -53,6 +54,7 @@ pub mod error {
 }
 
 pub use adaptive::{Refinement, Step};
+pub use mesh::{MeshSheet, SliceMesh};
 pub use planes::Planes;
 pub use section::{Section, Sides};
 pub use slicer::Slicer;

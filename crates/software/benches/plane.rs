@@ -80,7 +80,8 @@ fn plane(criterion: &mut Criterion) {
                 is_transparent: false,
                 shows_bricks: false,
             });
-            let frame = Frame { width: size, height: size, camera, background: [0.0; 3], content };
+            let frame =
+                Frame { width: size, height: size, camera, background: [0.0; 3], meshes: &[], content };
             group.throughput(Throughput::Elements(u64::from(size) * u64::from(size)));
             group.bench_function(BenchmarkId::new(name, size), |bencher| {
                 bencher.iter(|| backend.draw(&frame).expect("every brick is resident"));

@@ -121,13 +121,17 @@ impl Backend for SoftwareBackend {
     }
 
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
+        check_frame(frame, self.volume.as_ref().map(|(layout, _)| layout), MAX_SIZE)?;
+        if let Content::Sheets(_) = &frame.content {
+            return Err(DrawError::Device("sheets are not drawn yet".to_owned()));
+        }
         let (layout, pool) = self.volume.as_ref().ok_or(DrawError::NoVolume)?;
-        check_frame(frame, layout, MAX_SIZE)?;
         let pixels = match &frame.content {
             Content::Rays(rays) => {
                 for_bricks!(pool, |bricks| tile::draw(self.level, frame, rays, layout, bricks))?
             }
             Content::Cubes(content) => cubes::draw(self.level, frame, content, layout),
+            Content::Sheets(_) => Vec::new(),
             Content::Planes(planes) => match pool {
                 Pool::U8(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),
                 Pool::U16(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),

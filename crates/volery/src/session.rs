@@ -319,6 +319,7 @@ impl Session {
             height: view.height,
             camera: view.camera,
             background: view.background.map(|c| c as f32),
+            meshes: &[],
             content,
         };
         Ok(self.backend.draw(&frame)?.image)

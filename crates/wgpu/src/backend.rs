@@ -165,8 +165,11 @@ impl Backend for WgpuBackend {
     }
 
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
+        check_frame(frame, self.pool.as_ref().map(Pool::layout), MAX_SIZE)?;
+        if let Content::Sheets(_) = &frame.content {
+            return Err(DrawError::Device("sheets are not drawn yet".to_owned()));
+        }
         let pool = self.pool.as_ref().ok_or(DrawError::NoVolume)?;
-        check_frame(frame, pool.layout(), MAX_SIZE)?;
         if let Some(brick) = frame.content.bricks().find(|brick| !pool.resident().contains_key(&brick.id)) {
             return Err(DrawError::NotResident { id: brick.id });
         }
@@ -176,6 +179,7 @@ impl Backend for WgpuBackend {
             Content::Rays(rays) => self.cast_rays(frame, rays),
             Content::Cubes(cubes) if cubes.cubes.is_empty() => Ok(background(frame)),
             Content::Cubes(cubes) => self.cubes.draw(&self.gpu, pool.layout(), &mut self.band, frame, cubes),
+            Content::Sheets(_) => Ok(background(frame)),
             Content::Planes(planes) if !has_bricks || planes.planes.is_empty() => Ok(background(frame)),
             Content::Planes(planes) => self.draw_planes(frame, planes),
         };

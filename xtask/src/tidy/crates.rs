@@ -31,7 +31,7 @@ const GRAPH: [Rule; 15] = [
     rule("volery-shaders", "shaders", &[]),
     rule("volery-wgpu", "crates/wgpu", &["volery-scene", "volery-cubefan", "volery-frame", "volery-shaders"]),
     rule("volery-reference", "crates/reference", &["volery-scene"]),
-    rule("volery-io", "crates/io", &["volery-scene"]),
+    rule("volery-io", "crates/io", &["volery-scene", "volery-slicing"]),
     rule(
         "volery",
         "crates/volery",

@@ -68,7 +68,7 @@ fn draw(
     assert!(camera.defects().is_empty(), "the suite's camera: {:?}", camera.defects());
     backend.set_volume(layout).expect("the suite's volumes are small");
     let content = Content::Cubes(Cubes { cubes, thickness });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, content };
+    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
     backend.draw(&frame).expect("cubes need no brick").image
 }
 

@@ -85,7 +85,7 @@ pub(super) fn try_draw(
         is_transparent: look.is_transparent,
         shows_bricks: look.shows_bricks,
     });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, content };
+    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
     backend.draw(&frame).map(|drawn| drawn.image)
 }
 

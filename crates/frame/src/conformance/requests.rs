@@ -31,7 +31,7 @@ fn draw_placed(
 ) -> Result<Image, DrawError> {
     let transfer = &volume.integrated(&smooth_transfer(1.0));
     let content = Content::Rays(Rays { transfer, bricks });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, content };
+    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
     backend.draw(&frame).map(|drawn| drawn.image)
 }
 

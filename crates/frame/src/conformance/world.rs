@@ -251,7 +251,7 @@ pub(super) fn draw_resident(
     let placed: Vec<_> = bricks.iter().map(|brick| brick.placed).collect();
     let transfer = &volume.integrated(transfer);
     let content = Content::Rays(Rays { transfer, bricks: &placed });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, content };
+    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
     let drawn = backend.draw(&frame).expect("every brick is resident and in its place");
     assert_eq!((drawn.image.width, drawn.image.height), (width, height), "size of the picture");
     assert!(drawn.device_seconds.is_none_or(|s| s >= 0.0 && s.is_finite()), "{:?}", drawn.device_seconds);

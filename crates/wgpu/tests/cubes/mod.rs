@@ -30,7 +30,7 @@ fn draw(
     };
     backend.set_volume(&layout).expect("no brick is needed");
     let content = Content::Cubes(Cubes { cubes, thickness: Thickness::Exact });
-    let frame = Frame { width, height, camera, background: [0.25; 3], content };
+    let frame = Frame { width, height, camera, background: [0.25; 3], meshes: &[], content };
     backend.draw(&frame).expect("cubes need no brick").image
 }
 
