@@ -1,4 +1,4 @@
-//! Volumes by code: small grids with known formulas, for tests, demos and benchmarks.
+//! Volumes and cells by code: small grids with known formulas, for tests, demos and benchmarks.
 //!
 //! Every generator is a pure function of its arguments: the same bits on every machine with the same
 //! `f64` mathematics library, no file, no clock, no random state. Where a closed form of the picture is
@@ -14,10 +14,12 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use volery_scene::{Samples, VoxelGrid};
 
+mod cells;
 mod head;
 mod tissue;
 mod zone_plate;
 
+pub use cells::{CYLINDER_RADIUS, cylinder, cylinder_at};
 pub use head::{head, head_u8};
 pub use tissue::tissue;
 pub use zone_plate::zone_plate;

@@ -117,3 +117,54 @@ fn a_zone_plate_is_an_image_of_rings_on_tiles() {
         assert!((0.24..0.27).contains(&found), "channel {c}: {found}");
     }
 }
+
+#[test]
+fn cells_around_a_cylinder_fit_face_to_face() {
+    use std::collections::BTreeMap;
+    use volery_scene::CellType;
+    for n in [1, 2, 3, 6] {
+        let grid = cylinder(n);
+        assert_eq!(grid.defects(), [], "{n}");
+        let sector = 4 * n * n;
+        let expected = [10 * sector, sector, 2 * n * sector, n * sector, 0];
+        let of = |cell_type: CellType| grid.cells().count_by_type()[cell_type as usize];
+        let types = [
+            CellType::Tetrahedron,
+            CellType::Pyramid,
+            CellType::Wedge,
+            CellType::Hexahedron,
+            CellType::Voxel,
+        ];
+        assert_eq!(types.map(of), expected, "{n}");
+        let mut faces: BTreeMap<Vec<u32>, u32> = BTreeMap::new();
+        for (cell_type, nodes) in grid.cells().iter() {
+            for face in cell_type.faces() {
+                let mut face: Vec<u32> = face.iter().map(|&node| nodes[usize::from(node)]).collect();
+                face.sort_unstable();
+                *faces.entry(face).or_default() += 1;
+            }
+        }
+        assert!(faces.values().all(|&cells| cells <= 2), "{n}");
+        // At the cylinder and at both ends of wedges and hexahedra; triangles outside and at the ends of the rest.
+        let alone = faces.values().filter(|&&cells| cells == 1).count();
+        let (around, inner) = (4 * n, 4 * n * n);
+        assert_eq!(alone, inner + 2 * around * (2 * n + n) + 2 * inner + 4 * around, "{n}");
+        let volume =
+            (1.5f64.powi(2) - CYLINDER_RADIUS.powi(2)) * 1.5 * 2.0 * n as f64 * (PI / 2.0 / n as f64).sin();
+        let found: f64 =
+            grid.cells().iter().map(|(cell_type, nodes)| volume_of(&grid, cell_type, nodes)).sum();
+        println!("{n}: volume {found}, expected {volume}");
+        assert!((found - volume).abs() < 1e-12 * volume, "{n}: {found}, expected {volume}");
+    }
+    // At a quarter of the way around the speed is doubled, in front of and behind the cylinder the flow stands.
+    let at = |x, y| cylinder_at(glam::DVec3::new(x, y, 0.0));
+    assert!((at(0.0, CYLINDER_RADIUS) - 4.0).abs() < 1e-12 && at(-CYLINDER_RADIUS, 0.0).abs() < 1e-12);
+}
+
+/// By the divergence theorem over faces split at their first node; faces are planar.
+fn volume_of(grid: &volery_scene::UnstructuredGrid, cell_type: volery_scene::CellType, nodes: &[u32]) -> f64 {
+    let at = |node: u8| grid.points()[nodes[usize::from(node)] as usize];
+    let triangle = |a, b, c| at(a).dot(at(b).cross(at(c))) / 6.0;
+    let faces = cell_type.faces().iter();
+    faces.flat_map(|face| face.windows(2).map(|side| triangle(face[0], side[0], side[1]))).sum::<f64>().abs()
+}

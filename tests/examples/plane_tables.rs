@@ -157,7 +157,7 @@ impl Scene {
 }
 
 fn read(data: &Path, name: &str) -> Result<VoxelGrid, Box<dyn Error>> {
-    Ok(volery::read_input(&data.join(name), None)?.volume.grid)
+    Ok(volery::read_input(&data.join(name), None)?.volume()?.grid.clone())
 }
 
 fn scenes(data: &Path) -> Result<[Scene; 3], Box<dyn Error>> {
@@ -198,8 +198,8 @@ fn paper_table(scenes: &mut [Scene]) -> Result<(), Box<dyn Error>> {
         println!(
             "| {} | {level_0} | {} / {} | {} / {} | {:.1} x | {:.1} / {:.1} | {:.1} / {:.1} | {:.3} | {} |",
             scene.name,
-            fixed_work.nodes,
-            mr_work.nodes,
+            fixed_work.nodes.unwrap_or_default(),
+            mr_work.nodes.unwrap_or_default(),
             kilobytes(fixed_work.bytes_uploaded),
             kilobytes(mr_work.bytes_uploaded),
             fixed_work.bytes_uploaded as f64 / mr_work.bytes_uploaded as f64,
@@ -248,7 +248,7 @@ fn curve(scene: &mut Scene) -> Result<(), Box<dyn Error>> {
         let work = &timed.picture.report.work;
         println!(
             "| {dial} | {} | {} | {:.1} x | {:.1} | {:.1} | {:.4} | {} |",
-            work.nodes,
+            work.nodes.unwrap_or_default(),
             kilobytes(work.bytes_uploaded),
             full_bytes / work.bytes_uploaded as f64,
             timed.cold,

@@ -21,14 +21,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let input = volery::read_input(Path::new(scene), Some(Path::new(data)))?;
     let view = view_of(&input);
-    let grid = &input.volume.grid;
+    let grid = &input.volume()?.grid;
     let (width, height) = (view.width, view.height);
     let View { camera, transfer, background, .. } = &view;
     let truth = match plane {
         None => volery_reference::render(grid, camera, transfer, *background, width, height)?,
         Some(plane) => {
             let planes = &[plane];
-            let scene = PlaneScene { grid, planes, transfer, nearest: false, is_transparent: false };
+            let scene =
+                PlaneScene { grid, planes, transfer, nearest: false, is_transparent: false, meshes: &[] };
             scene.render(camera, *background, [width, height], &|_| {})?
         }
     };

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use volery::{
-    Backend, BackendChoice, Image, Input, Picture, PlaneView, Session, Thickness, View, open_backend,
-    read_input,
+    Backend, BackendChoice, Image, Input, Picture, PlaneView, Session, StackView, Thickness, View,
+    open_backend, read_input,
 };
 use volery_frame::{
     Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, UploadError, VolumeLayout,
@@ -67,6 +67,8 @@ pub fn view_of(input: &Input) -> View {
         tolerance: None,
         planes: PlaneView::default(),
         thickness: Thickness::default(),
+        stack: StackView::default(),
+        meshes: input.meshes.clone(),
     }
 }
 

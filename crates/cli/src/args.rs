@@ -9,6 +9,12 @@ use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::{BackendChoice, Plane, Preset, Thickness};
 
+mod slice;
+mod stack;
+
+pub(crate) use slice::SliceArgs;
+pub(crate) use stack::{StackArgs, numbered};
+
 /// Draws scientific volumes and says how far the picture is from the truth.
 #[derive(Debug, Parser)]
 #[command(name = "volery", version, max_term_width = 110, arg_required_else_help = false)]
@@ -23,10 +29,12 @@ pub(crate) struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Draw a volume
+    /// Draw a volume or an unstructured grid
     Render(Box<RenderArgs>),
     /// Say what a file is: kind, dims, type, spacing, range, histogram
     Info(InfoArgs),
+    /// Slice an unstructured grid by parallel planes, into a file that is small
+    Slice(SliceArgs),
     /// Draw generated volumes in every way there is; needs no file
     Demo(DemoArgs),
 }
@@ -39,13 +47,15 @@ pub(crate) enum Command {
   volery render scene.json --data volumes -o scene.png --tolerance 0.02 --verify --report scene.report.json
   volery render head.nii.gz -o cut.png --technique plane --plane 0.3,0.5,0.81,120 --focus 90,80,60
   volery render photo.png -o focus.png --technique plane --focus 200,150 --show-nodes
+  volery render wing.vtu -o wing.png --array Density --slices 512 --verify
+  volery render wing.vtu -o wing-%03d.png --time-steps wing.pvd
 
 Transfer functions by name: auto, ramp, ct-bone, ct-soft-tissue (both in Hounsfield units), mri,
 and the colour maps grayscale, viridis, inferno, plasma, magma, turbo, cool-to-warm, black-body.
 A file holds control points as a scene does, or a colour map that ParaView saved.")]
 pub(crate) struct RenderArgs {
-    /// A scene file, or a volume: .raw (.gz, .zst), .nii (.gz), .nrrd, .nhdr, .mha, .mhd, .vti, .tif, a
-    /// folder of slices
+    /// A scene file; a volume: .raw (.gz, .zst), .nii (.gz), .nrrd, .nhdr, .mha, .mhd, .vti, .tif, a folder of
+    /// slices; a grid: .vtu, .pvtu, .pvd, .vtk, .ex2; or slices of one: .vsl, .glb
     #[arg(value_name = "SCENE.json|FILE")]
     pub(crate) input: PathBuf,
     /// The picture: 8 bits as .png, 32-bit floats as .exr
@@ -55,6 +65,9 @@ pub(crate) struct RenderArgs {
     /// How to draw
     #[arg(long, value_enum, default_value_t = Technique::Auto)]
     pub(crate) technique: Technique,
+    /// The array to draw, of files that have several [default: the scene's, else the file's own]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) array: Option<String>,
     /// Width and height of the picture in pixels [default: the scene's, else 768x768]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(crate) size: Option<[u32; 2]>,
@@ -80,6 +93,8 @@ pub(crate) struct RenderArgs {
     pub(crate) thickness: Option<ThicknessName>,
     #[command(flatten)]
     pub(crate) planes: PlaneArgs,
+    #[command(flatten)]
+    pub(crate) stack: StackArgs,
     /// Folder that the paths in a scene file are relative to [default: that of the scene file]
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
@@ -131,10 +146,75 @@ pub(crate) struct PlaneArgs {
 }
 
 impl Cli {
-    /// Finds options that the technique asked for would not read.
+    /// Finds options that the technique asked for would not read, and names without a place for a number.
     pub(crate) fn checked(self) -> Result<Self, clap::Error> {
         let Command::Render(args) = &self.command else { return Ok(self) };
-        let PlaneArgs { planes, focus, quality: _, error, transparent, nearest, show_nodes } = &args.planes;
+        match args.conflict() {
+            None => Ok(self),
+            Some(message) => Err(Self::command().error(ErrorKind::ArgumentConflict, message)),
+        }
+    }
+}
+
+impl RenderArgs {
+    fn conflict(&self) -> Option<String> {
+        let of_fans = self.thickness.map(|_| "--thickness");
+        let options = [
+            (self.planes.given(), Technique::Plane),
+            (of_fans, Technique::Fans),
+            (self.stack.given(), Technique::Stack),
+        ];
+        let given = || options.iter().filter_map(|&(option, needed)| Some((option?, needed)));
+        let is_unread = |(_, needed): &(&str, Technique)| {
+            // What suits an input may be planes or a stack, but never fans.
+            let auto = *needed != Technique::Fans && self.technique == Technique::Auto;
+            self.technique != *needed && !auto
+        };
+        if let Some((option, needed)) = given().find(is_unread) {
+            return Some(format!("{option} is read by --technique {} alone", needed.name()));
+        }
+        if let [(option, _), (other, needed)] = given().collect::<Vec<_>>()[..] {
+            return Some(format!("{other} is read by --technique {} alone, {option} is not", needed.name()));
+        }
+        if let Some(option) = self.unread_by_stack().filter(|_| self.technique == Technique::Stack) {
+            return Some(format!("{option} is not read by --technique stack"));
+        }
+        if self.stack.time_steps.is_empty() {
+            return None;
+        }
+        let names = [
+            ("-o", Some(&self.output)),
+            ("--error-map", self.error_map.as_ref()),
+            ("--report", self.report.as_ref()),
+        ];
+        let unnumbered = |(option, path): (&str, Option<&PathBuf>)| {
+            let path = path.filter(|path| numbered(path, 0).is_none())?;
+            Some(format!(
+                "{option} {}: expected a name with %d or %03d for the number of the time step",
+                path.display()
+            ))
+        };
+        names.into_iter().find_map(unnumbered)
+    }
+
+    /// Whether the exact picture is wanted.
+    pub(crate) fn is_verified(&self) -> bool {
+        self.verify || self.error_map.is_some()
+    }
+
+    /// An option that is given, and means nothing for grids.
+    pub(crate) fn unread_by_stack(&self) -> Option<&'static str> {
+        let others =
+            [("--tolerance", self.tolerance.is_some()), ("--progressive", self.progressive.is_some())];
+        let others = others.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name);
+        self.planes.given().or(self.thickness.map(|_| "--thickness")).or(others)
+    }
+}
+
+impl PlaneArgs {
+    /// The first option that is given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let Self { planes, focus, quality: _, error, transparent, nearest, show_nodes } = self;
         let given = [
             ("--plane", !planes.is_empty()),
             ("--focus", focus.is_some()),
@@ -143,31 +223,7 @@ impl Cli {
             ("--nearest", *nearest),
             ("--show-nodes", *show_nodes),
         ];
-        let of_planes =
-            given.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| (name, Technique::Plane));
-        let of_fans = args.thickness.map(|_| ("--thickness", Technique::Fans));
-        let is_unread = |(_, needed): &(&str, Technique)| {
-            // What suits an input may be planes, but never fans.
-            let auto = *needed == Technique::Plane && args.technique == Technique::Auto;
-            args.technique != *needed && !auto
-        };
-        match of_planes.into_iter().chain(of_fans).find(is_unread) {
-            None => Ok(self),
-            Some((option, needed)) => {
-                let needed =
-                    needed.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-                let message = format!("{option} is read by --technique {needed} alone");
-                Err(Self::command().error(ErrorKind::ArgumentConflict, message))
-            }
-        }
-    }
-}
-
-impl PlaneArgs {
-    /// Whether anything says that planes are wanted.
-    pub(crate) fn is_given(&self) -> bool {
-        let Self { planes, focus, quality: _, error, transparent, nearest, show_nodes } = self;
-        !planes.is_empty() || focus.is_some() || error.is_some() || *transparent || *nearest || *show_nodes
+        given.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name)
     }
 }
 
@@ -203,7 +259,8 @@ pub(crate) struct DemoArgs {
 /// How to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Technique {
-    /// What suits the input: raycast for volumes, plane for images and colours and where an option asks for it
+    /// What suits the input: raycast for volumes, stack for grids, plane for images and colours and where an option
+    /// asks for it
     Auto,
     /// One ray per pixel through the nodes of a cut
     Raycast,
@@ -211,6 +268,15 @@ pub(crate) enum Technique {
     Plane,
     /// Cubes of constant value, as triangle fans from back to front
     Fans,
+    /// Slices through the cells of a grid, each standing for a slab
+    Stack,
+}
+
+impl Technique {
+    /// As written on the command line.
+    pub(crate) fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
 }
 
 /// How the length of a ray in a cube is found.

@@ -1,12 +1,12 @@
-//! `volery demo`: every technique and dial there is on generated volumes, with time and error of each.
+//! `volery demo`: every technique and dial there is on generated volumes and cells, with time and error of each.
 
 use std::path::{Path, PathBuf};
 
 use volery::glam::DVec3;
 use volery::output::{ErrorMap, write_image};
 use volery::{
-    BackendChoice, ColorMap, Focus, PlaneView, Preset, Session, Technique, View, ViewOptions, VoxelGrid, fit,
-    open_backend,
+    BackendChoice, ColorMap, Focus, GridSession, Picture, PlaneView, Preset, Session, Slicing, StackView,
+    Technique, View, ViewOptions, VoxelGrid, fit, open_backend, reference,
 };
 
 use crate::args::DemoArgs;
@@ -16,6 +16,15 @@ use crate::{Failure, say};
 
 /// Width and height of a picture.
 const SIDE: u32 = 272;
+
+/// Pictures in a row of the contact sheet: those of one scene.
+const COLUMNS: u32 = 7;
+
+/// Cells around the cylinder, over four.
+const CELLS: usize = 12;
+
+/// Slices where few are shown.
+const FEW_SLICES: usize = 24;
 
 /// Frames per row; the first also uploads.
 const FRAMES: usize = 5;
@@ -57,14 +66,14 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
     let folder = args.output.as_path();
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure(format!("{}: cannot be made: {error}", folder.display())))?;
-    say("volume          picture             ms a frame   nodes  max error      rmse")?;
+    say("data            picture             ms a frame  pieces  max error      rmse")?;
     let mut sheet = Sheet { folder, tiles: Vec::new() };
     for scene in scenes() {
         sheet.draw_scene(&scene, args.backend.into())?;
     }
-    let columns = sheet.tiles.len() as u32 / 2;
+    sheet.draw_cells(args.backend.into())?;
     let file = folder.join("contact-sheet.png");
-    write_image(&file, &contact_sheet(&sheet.tiles, columns))?;
+    write_image(&file, &contact_sheet(&sheet.tiles, COLUMNS))?;
     say(file.display())
 }
 
@@ -108,6 +117,40 @@ impl Sheet<'_> {
         self.draw(&mut fans, &view, [name, &format!("fans, tol. {FANS_TOLERANCE}")], false)
     }
 
+    /// Cells of several types, sliced.
+    fn draw_cells(&mut self, choice: BackendChoice) -> Result<(), Failure> {
+        let name = "cylinder";
+        let mut session = GridSession::open(volery_data::cylinder(CELLS), None, open_backend(choice)?)?;
+        let direction = Some(fit::Direction { azimuth_deg: -25.0, elevation_deg: 30.0, zoom: 1.1 });
+        let options = ViewOptions { width: SIDE, height: SIDE, direction, ..ViewOptions::default() };
+        let options = ViewOptions { transfer: Some(session.preset(Preset::Auto)), ..options };
+        let full = session.view(&options);
+        let parallel = session.view(&ViewOptions { orthographic: true, ..options });
+        let of = |stack: StackView| View { stack, ..full.clone() };
+        let few = StackView { num_slices: FEW_SLICES, ..full.stack.clone() };
+        let views = [
+            ("slices", full.clone(), false),
+            ("orthographic", parallel, false),
+            ("along axes", of(StackView { slicing: Slicing::Axes, ..full.stack.clone() }), false),
+            ("few and finer", of(StackView { adaptive: Some(1.0), ..few.clone() }), false),
+            ("few slices", of(few), true),
+            ("shaded", of(StackView { is_lit: true, ..full.stack.clone() }), false),
+        ];
+        for (title, view, maps_error) in views {
+            let (picture, truth) = {
+                let bar = Progress::bar(format!("{name}, {title}"));
+                let mut picture = session.render_frames(&view, FRAMES)?;
+                // The reference knows no light.
+                let knows = !view.stack.is_lit;
+                let verify = |picture| session.verify(&view, picture, &|done| bar.set(done));
+                let truth = knows.then(|| verify(&mut picture)).transpose()?;
+                (picture, truth)
+            };
+            self.add([name, title], picture, truth.as_ref(), maps_error)?;
+        }
+        Ok(())
+    }
+
     /// Draws, measures, prints and writes one picture, and the map of its error if that is wanted.
     fn draw(
         &mut self,
@@ -116,28 +159,40 @@ impl Sheet<'_> {
         [name, title]: [&str; 2],
         maps_error: bool,
     ) -> Result<(), Failure> {
-        let (mut picture, truth) = {
+        let (picture, truth) = {
             let bar = Progress::bar(format!("{name}, {title}"));
             let mut picture = session.render_frames(view, FRAMES)?;
             let truth = session.verify(view, &mut picture, &|done| bar.set(done))?;
             (picture, truth)
         };
-        picture.report.input.path = Some(name.to_owned());
+        self.add([name, title], picture, Some(&truth), maps_error)
+    }
+
+    /// Prints and writes one picture, and the map of its error if that is wanted and there is a truth.
+    fn add(
+        &mut self,
+        [name, title]: [&str; 2],
+        picture: Picture,
+        truth: Option<&reference::Image>,
+        maps_error: bool,
+    ) -> Result<(), Failure> {
         let report = &picture.report;
         let milliseconds = 1e3 * report.seconds.frame;
-        let error = report.error.and_then(|error| error.measured).expect("it was verified");
-        let (max, rmse) = (error.measured_max, error.measured_rmse);
-        say(format_args!(
-            "{name:<15} {title:<19} {milliseconds:>10.1} {:>7}  {max:>9.5} {rmse:>9.6}",
-            report.work.nodes,
-        ))?;
+        let amount = report.work.nodes.or(report.work.slices).unwrap_or_default();
+        let error = report.error.and_then(|error| error.measured);
+        let (max, rmse) = error.map_or((String::new(), String::new()), |error| {
+            (format!("{:.5}", error.measured_max), format!("{:.6}", error.measured_rmse))
+        });
+        say(format_args!("{name:<15} {title:<19} {milliseconds:>10.1} {amount:>7}  {max:>9} {rmse:>9}"))?;
         write_image(&file_name(self.folder, name, title), &picture.image)?;
-        let caption = [format!("{name}: {title}"), format!("{milliseconds:.1} ms, rmse {rmse:.5}")];
-        let map = maps_error.then(|| ErrorMap::new(&picture.image, &truth)).transpose()?;
+        let rmse = error.map_or(String::new(), |error| format!(", rmse {:.5}", error.measured_rmse));
+        let caption = [format!("{name}: {title}"), format!("{milliseconds:.1} ms{rmse}")];
+        let map =
+            truth.filter(|_| maps_error).map(|truth| ErrorMap::new(&picture.image, truth)).transpose()?;
         self.tiles.push(Tile { image: picture.image, caption });
         if let Some(map) = map {
             write_image(&file_name(self.folder, name, "error map"), &map.image)?;
-            let caption = [format!("{name}: its error x {}", map.gain), format!("largest {max:.5}")];
+            let caption = [format!("{name}: its error x {}", map.gain), format!("largest {max}")];
             self.tiles.push(Tile { image: map.image, caption });
         }
         Ok(())

@@ -9,6 +9,7 @@ mod info;
 mod progress;
 mod render;
 mod sheet;
+mod slice;
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
@@ -56,6 +57,7 @@ fn run(cli: Cli) -> Result<(), Failure> {
     match cli.command {
         Command::Render(args) => render::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Slice(args) => slice::run(&args),
         Command::Demo(args) => demo::run(&args),
     }
 }

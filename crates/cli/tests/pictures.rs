@@ -322,10 +322,10 @@ fn the_demo_draws_every_technique_and_a_contact_sheet() {
     let shop = Workshop::new();
     let outcome = shop.done("demo -o pictures --backend software");
     let lines: Vec<_> = outcome.stdout.lines().collect();
-    assert_eq!(lines.len(), 1 + 2 * 6 + 1, "{}", outcome.stdout);
+    assert_eq!(lines.len(), 1 + 3 * 6 + 1, "{}", outcome.stdout);
     assert!(lines.last().unwrap().ends_with("contact-sheet.png"));
     let pictures = std::fs::read_dir(shop.path("pictures")).unwrap().count();
-    assert_eq!(pictures, 2 * 7 + 1);
+    assert_eq!(pictures, 3 * 7 + 1);
     let sheet = volery::io::read_png_rgb(&shop.path("pictures/contact-sheet.png")).unwrap();
-    assert!(sheet.width > 7 * 272 && sheet.height > 2 * 272);
+    assert!(sheet.width > 7 * 272 && sheet.height > 3 * 272);
 }

@@ -51,6 +51,8 @@ pub struct PlaneTile {
     pub shrink: [f32; 2],
     /// Depth of the eye, or of the plane on which orthographic rays start: what lies before it is not seen.
     pub first_depth: f32,
+    /// Depth along the view direction from the plane of the eye on, in world lengths, that is 0 here.
+    pub zero_depth: f64,
 }
 
 /// The planes of a frame, ready to be asked tile by tile.
@@ -192,6 +194,7 @@ impl PlaneTiles {
             dy: change(rays.origin_dy, rays.toward_dy),
             shrink: [rays.toward_dx, rays.toward_dy].map(|d| narrow(normal.dot(d) / anchor.toward)),
             first_depth: narrow(-common / unit),
+            zero_depth: common,
         }
     }
 }

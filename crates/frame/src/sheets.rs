@@ -18,9 +18,11 @@
 //! side of a triangle is seen.
 
 use glam::DVec3;
-use volery_scene::TransferFunction;
+use volery_scene::{Camera, TransferFunction};
 
 use crate::DrawError;
+
+mod transfer2d;
 
 /// Sheets to see, and how. No brick is read, no volume needed.
 #[derive(Clone, Copy, Debug)]
@@ -142,7 +144,8 @@ pub struct Sheet {
 /// Optical depths below this are clamped to it: what matter can be taken away in front of other matter.
 pub const MIN_DEPTH: f32 = -0.5;
 
-/// A light far away that lights both sides: `color * (ambient + diffuse * |direction . toward|)`.
+/// A light far away that lights both sides: `color * (ambient + diffuse * |direction . toward|)`, with the direction
+/// between vertices made a unit vector again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// Unit vector toward the light, in world space.
@@ -151,6 +154,15 @@ pub struct Light {
     pub ambient: f32,
     /// Of the colour where the light falls straight on, in addition.
     pub diffuse: f32,
+}
+
+impl Light {
+    /// A light that shines the way a camera without defects looks. `ambient` of the colour is there without it; where
+    /// the gradient points to the viewer, colours are those of the transfer function.
+    pub fn along_view(camera: &Camera, ambient: f32) -> Self {
+        let [_, _, forward] = camera.axes();
+        Self { toward: (-forward).as_vec3().to_array(), ambient, diffuse: 1.0 - ambient }
+    }
 }
 
 /// Colour and extinction over values, or over values and magnitudes of gradients: a table of one row or of many.
@@ -241,5 +253,23 @@ impl SheetTransfer {
         let mix = |a: [f32; 4], b: [f32; 4], w: f32| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * w);
         let upper = mix(at(top, left), at(top, right), u);
         if top == bottom { upper } else { mix(upper, mix(at(bottom, left), at(bottom, right), u), v) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use volery_scene::Projection;
+
+    use super::*;
+
+    #[test]
+    fn a_light_along_the_view_shows_full_colour_where_the_gradient_meets_the_viewer() {
+        let eye = DVec3::new(3.0, 0.0, 4.0);
+        let projection = Projection::Perspective { fov_y_deg: 30.0 };
+        let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, projection };
+        let light = Light::along_view(&camera, 0.25);
+        let expected = [0.6, 0.0, 0.8];
+        assert!((0..3).all(|i| (light.toward[i] - expected[i]).abs() < 1e-6), "{:?}", light.toward);
+        assert_eq!(light.ambient + light.diffuse, 1.0);
     }
 }

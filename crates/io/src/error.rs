@@ -87,6 +87,12 @@ pub enum Problem {
     /// Points, cells and values make no unstructured grid.
     #[error("{0}")]
     Cells(volery_scene::unstructured::Error),
+    /// Points, triangles and colour make no mesh.
+    #[error("{0}")]
+    Mesh(volery_scene::mesh::Error),
+    /// Numbers that make no stack of slices.
+    #[error("{0}")]
+    Slices(volery_slicing::error::Decode),
 }
 
 impl Problem {

@@ -23,8 +23,11 @@ mod exodus;
 mod join;
 mod kinds;
 mod legacy;
+mod pvd;
 mod pvtu;
 mod vtu;
+
+pub use pvd::{TimeStep, read_time_steps};
 
 /// What the caller wants of a grid.
 #[derive(Clone, Debug)]
@@ -52,6 +55,8 @@ pub enum GridFormat {
     Pvtu,
     /// VTK's legacy format, `.vtk`.
     LegacyVtk,
+    /// VTK's collection of time steps, `.pvd`, each a grid in a file of its own.
+    Pvd,
     /// Exodus II in netCDF-3, `.ex2`, `.exo`, `.e`.
     Exodus,
 }
@@ -61,6 +66,7 @@ impl fmt::Display for GridFormat {
         f.write_str(match self {
             Self::Vtu => "VTK unstructured grid",
             Self::Pvtu => "VTK parallel unstructured grid",
+            Self::Pvd => "VTK collection",
             Self::LegacyVtk => "legacy VTK unstructured grid",
             Self::Exodus => "Exodus II",
         })
@@ -128,7 +134,7 @@ pub fn is_grid(path: &Path) -> bool {
     format_by_name(path).or_else(|| format_by_content(path)).is_some()
 }
 
-/// Reads a grid from a file.
+/// Reads a grid from a file; of a series the first time step.
 ///
 /// Large files are mapped into memory while they are read: they must not be changed meanwhile.
 ///
@@ -137,7 +143,10 @@ pub fn is_grid(path: &Path) -> bool {
 /// kind that is not supported: one line that says what was found and what was expected.
 pub fn read_grid(path: &Path, options: &GridOptions) -> Result<GridFile, ReadError> {
     with_parts(path, |format, parts| {
-        let (grid, array, notes) = join::join(parts, options)?;
+        let (grid, array, mut notes) = join::join(parts, options)?;
+        if format == GridFormat::Pvd {
+            notes.push("of a series of time steps the first is read".to_owned());
+        }
         Ok(GridFile { grid, format, array, notes })
     })
 }
@@ -236,20 +245,36 @@ fn with_parts<R>(
     path: &Path,
     run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, ReadError> {
-    let read = || {
-        // A file that cannot be opened is to say so, whatever its name is.
-        bytes::open(path)?;
-        let expected = "one that ends in .vtu, .pvtu, .vtk, .ex2, .exo or .e";
-        let format = format_by_content(path).or_else(|| format_by_name(path));
-        let format = format.ok_or_else(|| Problem::field("file name", quoted(lower_name(path)), expected))?;
-        match format {
-            GridFormat::Vtu => vtu::with_parts(&load(path)?, |parts| run(format, parts)),
-            GridFormat::Pvtu => pvtu::with_parts(path, |parts| run(format, parts)),
-            GridFormat::LegacyVtk => legacy::with_parts(&load(path)?, |parts| run(format, parts)),
-            GridFormat::Exodus => exodus::with_parts(&load(path)?, |parts| run(format, parts)),
-        }
+    let read = match format_of(path) {
+        Ok(GridFormat::Pvd) => pvd::with_first_step(path, |parts| run(GridFormat::Pvd, parts)),
+        Ok(format) => with_parts_of(path, format, run),
+        Err(problem) => Err(problem),
     };
-    read().map_err(|problem| ReadError { path: path.to_owned(), problem })
+    read.map_err(|problem| ReadError { path: path.to_owned(), problem })
+}
+
+/// Opens a file of one grid and runs something on its parts.
+fn with_parts_of<R>(
+    path: &Path,
+    format: GridFormat,
+    run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
+) -> Result<R, Problem> {
+    match format {
+        GridFormat::Vtu => vtu::with_parts(&load(path)?, |parts| run(format, parts)),
+        GridFormat::Pvtu => pvtu::with_parts(path, |parts| run(format, parts)),
+        GridFormat::LegacyVtk => legacy::with_parts(&load(path)?, |parts| run(format, parts)),
+        GridFormat::Exodus => exodus::with_parts(&load(path)?, |parts| run(format, parts)),
+        GridFormat::Pvd => Err(Problem::field("file", "a collection", "a grid of one time")),
+    }
+}
+
+/// The format of a file that is there.
+fn format_of(path: &Path) -> Result<GridFormat, Problem> {
+    // A file that cannot be opened is to say so, whatever its name is.
+    bytes::open(path)?;
+    let expected = "one that ends in .vtu, .pvtu, .pvd, .vtk, .ex2, .exo or .e";
+    let format = format_by_content(path).or_else(|| format_by_name(path));
+    format.ok_or_else(|| Problem::field("file name", quoted(lower_name(path)), expected))
 }
 
 fn format_by_name(path: &Path) -> Option<GridFormat> {
@@ -257,6 +282,7 @@ fn format_by_name(path: &Path) -> Option<GridFormat> {
     let endings = [
         (".vtu", GridFormat::Vtu),
         (".pvtu", GridFormat::Pvtu),
+        (".pvd", GridFormat::Pvd),
         (".vtk", GridFormat::LegacyVtk),
         (".ex2", GridFormat::Exodus),
         (".exo", GridFormat::Exodus),
@@ -277,6 +303,8 @@ fn format_by_content(path: &Path) -> Option<GridFormat> {
         Some(GridFormat::Vtu)
     } else if is_type("PUnstructuredGrid") {
         Some(GridFormat::Pvtu)
+    } else if is_type("Collection") {
+        Some(GridFormat::Pvd)
     } else if head.starts_with("# vtk DataFile") {
         Some(GridFormat::LegacyVtk)
     } else {

@@ -1,9 +1,9 @@
-//! Files in, files out: volumes, unstructured grids, images, scene files, transfer functions.
+//! Files in, files out: volumes, unstructured grids, opaque meshes, images, scene files, transfer functions.
 //!
 //! [`read_volume`] reads raw, NIfTI-1, NRRD, MetaImage, VTK image data, TIFF, PNG, JPEG and folders of
 //! slices into a [`VoxelGrid`](volery_scene::VoxelGrid); [`read_grid`] reads VTK's XML and legacy unstructured
 //! grids, also in parallel pieces, and Exodus II in netCDF-3 into an
-//! [`UnstructuredGrid`](volery_scene::UnstructuredGrid); [`SceneFile`] and [`ColorMap`] read what to draw;
+//! [`UnstructuredGrid`](volery_scene::UnstructuredGrid); [`read_mesh`] reads opaque surfaces; [`SceneFile`] and [`ColorMap`] read what to draw;
 //! [`write_png`], [`write_exr`] and [`write_nrrd`] save, through [`write_atomically`].
 //!
 //! # Guarantees
@@ -23,15 +23,17 @@
 //! hold linear values without gamma, row 0 at the top.
 //!
 //! # Non-goals
-//! Opaque meshes; polyhedra and cells without volume; netCDF-4; DICOM; colour maps by index.
+//! Materials of meshes; polyhedra and cells without volume; netCDF-4; DICOM; colour maps by index.
 
 mod bytes;
 mod error;
 pub mod grid;
 mod layout;
+pub mod mesh;
 mod numbers;
 mod out;
 pub mod scene_file;
+pub mod stack;
 pub mod transfer;
 mod volume;
 mod vtk_xml;
@@ -39,9 +41,13 @@ mod vtk_xml;
 pub use error::{Problem, ReadError};
 pub use grid::{GridFile, GridOptions, is_grid, read_grid};
 pub use layout::{ByteOrder, Element, ParseElementError};
+pub use mesh::{MeshFile, read_mesh};
 pub use out::{Picture, WriteError, read_png_rgb, write_atomically, write_exr, write_nrrd, write_png};
 pub use scene_file::SceneFile;
-pub use transfer::{ColorMap, NamedTransfer, read_transfer};
+pub use stack::{GlbOptions, read_stack, write_glb, write_vsl};
+pub use transfer::{
+    ColorMap, NamedTransfer, read_transfer, read_transfer_2d, write_transfer, write_transfer_2d,
+};
 pub use volume::{Format, ReadOptions, Volume, read_volume};
 
 #[cfg(doctest)]

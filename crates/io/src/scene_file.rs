@@ -10,7 +10,8 @@
 //!                        "unit_distance": 1}}
 //! ```
 //! `input` may also have `dims`, `dtype`, `spacing` and `array`; an orthographic camera has `height` in place
-//! of `fov_y_deg`; `name` is optional. Any other field is an error, so that a slip of the pen is found.
+//! of `fov_y_deg`; `name` is optional, and so are opaque surfaces among the data:
+//! `"meshes": [{"file": "hull.obj", "color": [0.8, 0.8, 0.8]}]`. Any other field is an error, so that a slip of the pen is found.
 
 use std::path::{Path, PathBuf};
 
@@ -48,6 +49,17 @@ pub struct SceneFile {
     pub camera: Camera,
     /// Colour and opacity of values.
     pub transfer: TransferFunction,
+    /// Opaque surfaces among the data.
+    pub meshes: Vec<SceneMesh>,
+}
+
+/// An opaque surface of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneMesh {
+    /// As written: relative to the scene file or the data folder, for [`read_mesh`](crate::read_mesh).
+    pub file: PathBuf,
+    /// Linear RGB, each in [0, 1].
+    pub color: [f64; 3],
 }
 
 /// Whether the input is a voxel volume or an unstructured grid.
@@ -116,6 +128,14 @@ pub enum SceneProblem {
         /// As given.
         found: [f64; 3],
     },
+    /// The colour of a mesh is none.
+    #[error("meshes[{index}].color is {found:?}, expected three numbers in [0, 1]")]
+    MeshColor {
+        /// Place of the mesh in the list.
+        index: usize,
+        /// As given.
+        found: [f64; 3],
+    },
     /// The spacing.
     #[error("input.spacing is {found:?}, expected three positive finite numbers")]
     Spacing {
@@ -150,6 +170,15 @@ struct SceneJson {
     background: [f64; 3],
     camera: CameraJson,
     transfer_function: TransferJson,
+    #[serde(default)]
+    meshes: Vec<MeshJson>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeshJson {
+    file: PathBuf,
+    color: [f64; 3],
 }
 
 #[derive(Deserialize)]
@@ -200,11 +229,15 @@ impl SceneFile {
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneProblem> {
         let json: SceneJson =
             serde_json::from_str(text).map_err(|error| SceneProblem::Json(OneLine(error).to_string()))?;
-        let SceneJson { name: own_name, input, size, background, camera, transfer_function } = json;
+        let SceneJson { name: own_name, input, size, background, camera, transfer_function, meshes } = json;
         check_size(size)?;
-        if !background.iter().all(|channel| (0.0..=1.0).contains(channel)) {
+        if !is_color(background) {
             return Err(SceneProblem::Background { found: background });
         }
+        let mesh = |(index, MeshJson { file, color })| match color {
+            found if !is_color(found) => Err(SceneProblem::MeshColor { index, found }),
+            color => Ok(SceneMesh { file, color }),
+        };
         Ok(Self {
             name: own_name.unwrap_or_else(|| name.to_owned()),
             input: input.validated()?,
@@ -212,8 +245,13 @@ impl SceneFile {
             background,
             camera: camera.validated()?,
             transfer: transfer_function.validated().map_err(SceneProblem::Transfer)?,
+            meshes: meshes.into_iter().enumerate().map(mesh).collect::<Result<_, _>>()?,
         })
     }
+}
+
+fn is_color(color: [f64; 3]) -> bool {
+    color.iter().all(|channel| (0.0..=1.0).contains(channel))
 }
 
 /// Checks the size of a picture, from a scene or elsewhere.

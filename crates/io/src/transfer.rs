@@ -1,7 +1,7 @@
 //! Transfer functions from files: our own JSON, and colour maps that ParaView saved.
 //!
 //! Ours is `{"points": [{"value": 0, "color": [0, 0, 0], "opacity": 0}, ...], "unit_distance": 1}`, in data
-//! units. ParaView's is one preset or an array of them, with `RGBPoints` and maybe `Points`; commas before a
+//! units; for functions over value and gradient magnitude see [`read_transfer_2d`]. ParaView's is one preset or an array of them, with `RGBPoints` and maybe `Points`; commas before a
 //! closing bracket are forgiven, since ParaView ships such files. `NanColor` is not used: a blank sample
 //! holds no matter. Maps of `IndexedColors` have no values to interpolate and are refused.
 
@@ -9,16 +9,19 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use serde_json::Value;
-use volery_scene::{ControlPoint, TransferFunction, transfer};
+use volery_scene::{TransferFunction, transfer};
 
 use crate::bytes::load_text;
 use crate::error::{OneLine, Problem, first_of, quoted};
 
 mod color;
 mod color_map;
+mod json;
 
 pub use color::ColorSpace;
 pub use color_map::{ColorMap, MAX_COLOR_ERROR, OpacityPoint};
+pub(crate) use json::TransferJson;
+pub use json::{Transfer2dProblem, read_transfer_2d, write_transfer, write_transfer_2d};
 
 /// Transfer function files larger than this are refused.
 const MAX_FILE_BYTES: u64 = 64 << 20;
@@ -83,6 +86,12 @@ pub enum TransferProblem {
     /// The function is not meaningful.
     #[error("transfer function: {}", first_of(&.0.defects))]
     Defects(transfer::Error),
+    /// Fields over value and gradient magnitude that make no function.
+    #[error("{0}")]
+    TwoDimensional(Transfer2dProblem),
+    /// A function that [`read_transfer_2d`] reads was read as one over values alone.
+    #[error("it is a transfer function over value and gradient magnitude, expected one over values alone")]
+    HasMagnitudes,
 }
 
 /// Reads a transfer function: our JSON or a colour map of ParaView.
@@ -99,6 +108,9 @@ pub fn read_transfer(path: &Path, options: &TransferOptions) -> Result<NamedTran
             let transfer = TransferJson::deserialize(value).map_err(json_problem)?.validated();
             return Ok(NamedTransfer { name, transfer: transfer.map_err(TransferProblem::Defects)? });
         }
+        if value.get("magnitudes").is_some() {
+            return Err(TransferProblem::HasMagnitudes);
+        }
         let map = choose(color_maps(&value)?, options.map)?;
         let transfer = map.transfer_function(options.range, options.unit_distance);
         Ok(NamedTransfer { transfer: transfer.map_err(TransferProblem::Defects)?, name: map.name })
@@ -113,29 +125,6 @@ pub fn read_transfer(path: &Path, options: &TransferOptions) -> Result<NamedTran
 /// When the text is no JSON or one of its maps is wrong or not supported.
 pub fn parse_color_maps(text: &str) -> Result<Vec<ColorMap>, TransferProblem> {
     color_maps(&lenient_json(text)?)?.into_iter().collect()
-}
-
-/// The transfer function in a scene file and in a file of its own.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct TransferJson {
-    points: Vec<PointJson>,
-    unit_distance: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PointJson {
-    value: f64,
-    color: [f64; 3],
-    opacity: f64,
-}
-
-impl TransferJson {
-    pub(crate) fn validated(self) -> Result<TransferFunction, transfer::Error> {
-        let point = |PointJson { value, color, opacity }| ControlPoint { value, color, opacity };
-        TransferFunction::new(self.points.into_iter().map(point).collect(), self.unit_distance)
-    }
 }
 
 fn json_problem(error: serde_json::Error) -> TransferProblem {

@@ -16,6 +16,8 @@ use crate::numbers::{Numbers, Scalar};
 mod base64;
 mod payload;
 
+pub(crate) use base64::Base64;
+
 use payload::{BinaryForm, Compressor, Encoding, Payload};
 
 /// A file: its elements in their order, and what stands behind them.

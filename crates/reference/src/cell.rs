@@ -45,6 +45,7 @@ pub(crate) fn along(corners: &Corners, enter: DVec3, exit: DVec3) -> Cubic {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::Field;
     use proptest::prelude::*;
 
     fn trilinear(corners: &Corners, p: DVec3) -> f64 {

@@ -1,4 +1,6 @@
-//! A cubic polynomial on [0, 1] in Bernstein form: the field along a ray through one cell.
+//! A cubic polynomial on [0, 1] in Bernstein form: the field along a ray through one cell of a voxel grid.
+
+use crate::field::Field;
 
 /// `Σ bᵢ Bᵢ(t)`. Its values lie in the range of its coefficients, and it starts and ends at the outer two.
 #[derive(Clone, Copy, Debug)]
@@ -14,31 +16,8 @@ impl Cubic {
         Self { bernstein, power }
     }
 
-    #[inline]
-    pub(crate) fn at(&self, t: f64) -> f64 {
-        let [a, b, c, d] = self.power;
-        a + t * (b + t * (c + t * d))
-    }
-
-    fn slope_at(&self, t: f64) -> f64 {
-        let [_, b, c, d] = self.power;
-        b + t * (2.0 * c + t * 3.0 * d)
-    }
-
-    /// A range that holds every value on [0, 1].
-    pub(crate) fn range(&self) -> [f64; 2] {
-        let [a, b, c, d] = self.bernstein;
-        [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
-    }
-
-    /// At least the steepest slope on [0, 1].
-    pub(crate) fn max_slope(&self) -> f64 {
-        let [a, b, c, d] = self.bernstein;
-        3.0 * (b - a).abs().max((c - b).abs()).max((d - c).abs())
-    }
-
     /// Where the slope changes its sign inside (0, 1), in order; `None`s last.
-    fn turns(&self) -> [Option<f64>; 2] {
+    fn turning_points(&self) -> [Option<f64>; 2] {
         let [_, b, c, d] = self.power;
         // b + 2 c t + 3 d t² = 0; the two forms of its roots that do not cancel.
         let discriminant = c * c - 3.0 * d * b;
@@ -53,52 +32,32 @@ impl Cubic {
             roots => roots,
         }
     }
+}
 
-    /// Calls `found(t)` for every place in (0, 1) where the field turns or crosses one of `edges(low, high)`,
-    /// the interesting values strictly between two values; in no particular order.
-    pub(crate) fn splits<'e>(&self, edges: impl Fn(f64, f64) -> &'e [f64], mut found: impl FnMut(f64)) {
-        let mut section = |from: f64, to: f64| {
-            let (a, b) = (self.at(from), self.at(to));
-            for &value in edges(a.min(b), a.max(b)) {
-                found(self.crossing(value, from, to));
-            }
-            if to < 1.0 {
-                found(to);
-            }
-        };
-        let mut from = 0.0;
-        for turn in self.turns().into_iter().flatten() {
-            section(from, turn);
-            from = turn;
-        }
-        section(from, 1.0);
+impl Field for Cubic {
+    #[inline]
+    fn at(&self, t: f64) -> f64 {
+        let [a, b, c, d] = self.power;
+        a + t * (b + t * (c + t * d))
     }
 
-    /// Where the field, monotone from `from` to `to`, has a value strictly between those at the two:
-    /// Newton's method kept inside a shrinking bracket, to the last bits of `t`.
-    fn crossing(&self, value: f64, from: f64, to: f64) -> f64 {
-        let (mut below, mut above) = if self.at(from) < value { (from, to) } else { (to, from) };
-        let mut t = (from + to) / 2.0;
-        // A bisection ends within 60 steps; Newton's steps, where taken, at least do not widen the bracket.
-        for _ in 0..120 {
-            let residual = self.at(t) - value;
-            if residual == 0.0 {
-                break;
-            }
-            if residual < 0.0 {
-                below = t;
-            } else {
-                above = t;
-            }
-            let (low, high) = (below.min(above), below.max(above));
-            let newton = t - residual / self.slope_at(t);
-            let next = if newton > low && newton < high { newton } else { low + (high - low) / 2.0 };
-            if (next - t).abs() <= f64::EPSILON * next {
-                break;
-            }
-            t = next;
-        }
-        t
+    fn slope_at(&self, t: f64) -> f64 {
+        let [_, b, c, d] = self.power;
+        b + t * (2.0 * c + t * 3.0 * d)
+    }
+
+    fn range(&self) -> [f64; 2] {
+        let [a, b, c, d] = self.bernstein;
+        [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
+    }
+
+    fn max_slope(&self) -> f64 {
+        let [a, b, c, d] = self.bernstein;
+        3.0 * (b - a).abs().max((c - b).abs()).max((d - c).abs())
+    }
+
+    fn turns(&self, found: impl FnMut(f64)) {
+        self.turning_points().into_iter().flatten().for_each(found);
     }
 }
 

@@ -16,8 +16,8 @@
 //! It ends always: after [`MAX_HALVINGS`] an interval is shorter than the spacing of `f64` in a cell, and the
 //! field itself is not known better.
 
-use crate::cubic::Cubic;
-use crate::transfer::Band;
+use crate::field::Field;
+use crate::transfer::{Band, Bands};
 
 /// Largest estimated error of one interval of a ray, in colour or transmittance.
 ///
@@ -32,6 +32,12 @@ pub(crate) const OPAQUE: f64 = 1e-12;
 const DEEPEST: f64 = 2.0;
 
 const MAX_HALVINGS: u32 = 56;
+
+/// Relative variation below which a field along a ray is constant but for rounding.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Unit distances beyond which a stretch of a ray gets no longer.
+pub(crate) const LONGEST: f64 = 1e300;
 
 const NUM_NODES: usize = 4;
 
@@ -127,14 +133,60 @@ fn homogeneous(color: [f64; 3], depth: f64) -> Light {
     Light { color: color.map(|c| c * opacity), transmittance: (-depth).exp() }
 }
 
-/// A part of a ray in one cell and one band of the transfer function.
-pub(crate) struct Piece<'a> {
-    /// The field along the whole cell.
-    pub(crate) field: &'a Cubic,
-    pub(crate) band: &'a Band,
-    /// World length of the field's unit interval, in unit distances of the transfer function.
-    pub(crate) length: f64,
+/// Puts matter of one value, `length` unit distances of it, behind `front`.
+pub(crate) fn add_constant(front: &mut Light, band: &Band, value: f64, length: f64) {
+    let extinction = band.extinction(value);
+    // Opaque is opaque, however short the way: it might have been rounded to nothing.
+    let depth = if extinction.is_finite() { extinction * length } else { extinction };
+    *front = front.then(&homogeneous(band.color(value), depth));
+}
+
+/// How matter along a ray is integrated.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Integrator<'a> {
+    pub(crate) bands: &'a Bands,
+    /// Largest estimated error of one interval.
     pub(crate) tolerance: f64,
+}
+
+impl Integrator<'_> {
+    /// Puts the matter of a field behind `front`. Its unit interval is `length` unit distances of the transfer
+    /// function long. `splits` is room to work in.
+    pub(crate) fn add(&self, front: &mut Light, field: &impl Field, length: f64, splits: &mut Vec<f64>) {
+        // Far more unit distances than any picture can tell apart, yet safe to multiply.
+        let length = length.min(LONGEST);
+        let [low, high] = field.range();
+        if high - low <= ROUNDING * low.abs().max(high.abs()) {
+            return add_constant(front, self.bands.at(low), low, length);
+        }
+        splits.clear();
+        splits.push(0.0);
+        if self.bands.of_range(low, high).len() > 1 {
+            field.splits(|low, high| self.bands.edges_between(low, high), |t| splits.push(t));
+            splits.sort_unstable_by(f64::total_cmp);
+        }
+        splits.push(1.0);
+        for ends in splits.windows(2) {
+            let band = self.bands.at(field.at(ends[0] + (ends[1] - ends[0]) / 2.0));
+            if ends[1] > ends[0] && !band.is_clear() {
+                let piece = Piece { field, band, length, tolerance: self.tolerance };
+                piece.add_to(front, ends[0], ends[1]);
+                if front.transmittance <= OPAQUE {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// A part of a ray in one cell and one band of the transfer function.
+struct Piece<'a, F> {
+    /// The field along the whole cell.
+    field: &'a F,
+    band: &'a Band,
+    /// World length of the field's unit interval, in unit distances of the transfer function.
+    length: f64,
+    tolerance: f64,
 }
 
 /// An interval of a piece, and what one application of the rule says of it.
@@ -146,25 +198,17 @@ struct Interval {
     light: Light,
 }
 
-impl Piece<'_> {
+impl<F: Field> Piece<'_, F> {
     /// Puts the part from `start` to `end` of the field's unit interval behind `front`.
-    pub(crate) fn add_to(&self, front: &mut Light, start: f64, end: f64) {
+    fn add_to(&self, front: &mut Light, start: f64, end: f64) {
         if self.band.is_opaque() {
             let entry = Light { color: self.band.color(self.field.at(start)), transmittance: 0.0 };
             *front = front.then(&entry);
         } else if self.band.is_uniform() {
-            self.add_constant_to(front, self.field.at(start), end - start);
+            add_constant(front, self.band, self.field.at(start), self.length * (end - start));
         } else {
             self.refine(front, &self.interval(start, end - start), 0);
         }
-    }
-
-    /// [`Piece::add_to`] where the field has one `value` over a `width` of the unit interval.
-    pub(crate) fn add_constant_to(&self, front: &mut Light, value: f64, width: f64) {
-        let extinction = self.band.extinction(value);
-        // Opaque is opaque, however short the way: it might have been rounded to nothing.
-        let depth = if extinction.is_finite() { extinction * self.length * width } else { extinction };
-        *front = front.then(&homogeneous(self.band.color(value), depth));
     }
 
     fn refine(&self, front: &mut Light, whole: &Interval, halvings: u32) {
@@ -218,7 +262,7 @@ impl Piece<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::transfer::Bands;
+    use crate::cubic::Cubic;
     use volery_scene::{ControlPoint, TransferFunction};
 
     #[test]

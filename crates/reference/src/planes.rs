@@ -6,10 +6,11 @@
 //! at equal distance the one listed first is in front.
 
 use glam::DVec3;
-use volery_scene::{Camera, Plane, Ray, SampleType, TransferFunction, VoxelGrid};
+use volery_scene::{Camera, Plane, Ray, SampleType, TransferFunction, TriangleMesh, VoxelGrid};
 
 use crate::image::Image;
 use crate::render::{Error, picture};
+use crate::surfaces::Backdrop;
 
 /// Distance beyond the domain's faces, relative to the reach of the scene, that counts as on them: a plane that
 /// coincides with a face is seen in spite of rounding.
@@ -32,6 +33,8 @@ pub struct PlaneScene<'a> {
     pub nearest: bool,
     /// Whether opacity lets light through; else planes are opaque where they are not blank.
     pub is_transparent: bool,
+    /// Opaque surfaces among the planes: they hide what is not before them.
+    pub meshes: &'a [TriangleMesh],
 }
 
 impl PlaneScene<'_> {
@@ -46,16 +49,23 @@ impl PlaneScene<'_> {
         size: [u32; 2],
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Image, Error> {
-        picture(camera, size, progress, |ray| self.trace(ray, background))
+        picture(camera, size, (self.meshes, background), progress, |ray, backdrop| {
+            self.trace_to(ray, backdrop)
+        })
     }
 
-    /// What one ray sees.
+    /// What one ray sees of the planes.
     pub fn trace(&self, ray: &Ray, background: [f64; 3]) -> [f64; 3] {
+        self.trace_to(ray, &Backdrop::far(background))
+    }
+
+    fn trace_to(&self, ray: &Ray, backdrop: &Backdrop) -> [f64; 3] {
         let hit = |plane: &Plane| {
             let Plane { normal, distance } = plane.normalized();
             (distance - normal.dot(ray.origin)) / normal.dot(ray.direction)
         };
-        let mut hits: Vec<f64> = self.planes.iter().map(hit).filter(|t| *t >= 0.0 && t.is_finite()).collect();
+        let is_seen = |t: &f64| *t >= 0.0 && t.is_finite() && *t < backdrop.distance;
+        let mut hits: Vec<f64> = self.planes.iter().map(hit).filter(is_seen).collect();
         // Stable, so that of equals the first stays in front.
         hits.sort_by(f64::total_cmp);
         let (mut color, mut clear) = ([0.0; 3], 1.0);
@@ -65,7 +75,7 @@ impl PlaneScene<'_> {
             (0..3).for_each(|i| color[i] += clear * opacity * seen[i]);
             clear *= 1.0 - opacity;
         }
-        std::array::from_fn(|i| color[i] + clear * background[i])
+        std::array::from_fn(|i| color[i] + clear * backdrop.color[i])
     }
 
     /// Colour and opacity at `origin + way`; `None` outside the domain and where it is blank.

@@ -3,9 +3,10 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
-use volery_scene::{Camera, Ray, SampleType, TransferFunction, VoxelGrid, camera};
+use volery_scene::{Camera, Ray, SampleType, TransferFunction, TriangleMesh, VoxelGrid, camera};
 
 use crate::image::Image;
+use crate::surfaces::{Backdrop, Surfaces};
 use crate::tracer::Tracer;
 
 /// Why there is no reference picture.
@@ -16,6 +17,14 @@ pub enum Error {
     ColorSamples {
         /// What the samples are.
         found: SampleType,
+    },
+    /// Values that are not those of a grid's nodes.
+    #[error("reference: {found} values at the nodes of a grid, expected {expected}")]
+    NodeValues {
+        /// Values given.
+        found: usize,
+        /// Number of nodes.
+        expected: usize,
     },
     /// The camera cannot take a picture.
     #[error("reference: {}", .defects.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
@@ -52,12 +61,13 @@ pub fn render(
     Tracer::new(grid, transfer)?.render(camera, background, width, height, &|_| {})
 }
 
-/// What each pixel's ray sees, row by row on all threads.
+/// What each pixel's ray sees before what it ends at, row by row on all threads.
 pub(crate) fn picture(
     camera: &Camera,
     [width, height]: [u32; 2],
+    (meshes, background): (&[TriangleMesh], [f64; 3]),
     progress: &(dyn Fn(f64) + Sync),
-    trace: impl Fn(&Ray) -> [f64; 3] + Sync,
+    trace: impl Fn(&Ray, &Backdrop) -> [f64; 3] + Sync,
 ) -> Result<Image, Error> {
     let defects = camera.defects();
     if !defects.is_empty() {
@@ -67,11 +77,13 @@ pub(crate) fn picture(
         return Err(Error::Size { width, height });
     }
     let rays = camera.rays(width, height);
+    let surfaces = Surfaces::new(meshes, camera, [width, height]);
     let num_done = AtomicU32::new(0);
     let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
     pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row_pixels, row)| {
         for (pixel, column) in row_pixels.iter_mut().zip(0..width) {
-            *pixel = trace(&rays.pixel(column, row));
+            let ray = rays.pixel(column, row);
+            *pixel = trace(&ray, &surfaces.backdrop([column, row], &ray, background));
         }
         let done = num_done.fetch_add(1, Ordering::Relaxed) + 1;
         progress(f64::from(done) / f64::from(height));
@@ -93,6 +105,8 @@ impl Tracer<'_> {
         height: u32,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Image, Error> {
-        picture(camera, [width, height], progress, |ray| self.trace(ray).over(background))
+        picture(camera, [width, height], (self.meshes(), background), progress, |ray, backdrop| {
+            self.trace_to(ray, backdrop.distance).over(backdrop.color)
+        })
     }
 }

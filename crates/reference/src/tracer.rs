@@ -7,18 +7,15 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_scene::{Ray, Sample, Samples, TransferFunction, VoxelGrid, for_samples};
+use volery_scene::{Ray, Sample, Samples, TransferFunction, TriangleMesh, VoxelGrid, for_samples};
 
 use crate::cell::{self, Corners};
-use crate::integral::{Light, OPAQUE, PIECE_TOLERANCE, Piece};
+use crate::integral::{Integrator, LONGEST, Light, OPAQUE, PIECE_TOLERANCE, add_constant};
 use crate::render::Error;
 use crate::transfer::{Band, Bands};
 
 /// Cells per axis of a block that is skipped as one.
 const BLOCK: usize = 8;
-
-/// Relative variation below which a field along a ray is constant but for rounding.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Everything that is the same for all rays: the grid, the transfer function, and where there is matter.
 #[derive(Debug)]
@@ -30,6 +27,7 @@ pub struct Tracer<'a> {
     /// Per block, x fastest: whether some value between its least and greatest sample is not transparent.
     holds_matter: Vec<bool>,
     tolerance: f64,
+    meshes: &'a [TriangleMesh],
 }
 
 /// The way of a ray through the domain: `origin + t * direction`, in units of samples, for `t` from `start`
@@ -110,7 +108,8 @@ impl<'a> Tracer<'a> {
             |values| blocks_with_matter(values, grid, num_blocks, &bands);
             color _ => Vec::new()
         );
-        Ok(Self { grid, bands, num_cells, num_blocks, holds_matter, tolerance: PIECE_TOLERANCE })
+        let tolerance = PIECE_TOLERANCE;
+        Ok(Self { grid, bands, num_cells, num_blocks, holds_matter, tolerance, meshes: &[] })
     }
 
     /// The same with another tolerance than [`PIECE_TOLERANCE`] for each interval of a ray. Below 1e-15, where
@@ -120,17 +119,34 @@ impl<'a> Tracer<'a> {
         Self { tolerance: tolerance.max(1e-15), ..self }
     }
 
+    /// The same with opaque surfaces among the matter: a ray ends at the nearest. Pictures show them, single rays do
+    /// not.
+    #[must_use]
+    pub fn among(self, meshes: &'a [TriangleMesh]) -> Self {
+        Self { meshes, ..self }
+    }
+
+    pub(crate) fn meshes(&self) -> &'a [TriangleMesh] {
+        self.meshes
+    }
+
     /// The light that comes along a ray to its origin.
     pub fn trace(&self, ray: &Ray) -> Light {
-        let Some(way) = self.clip(ray) else { return Light::CLEAR };
+        self.trace_to(ray, f64::INFINITY)
+    }
+
+    /// The light that comes from the first part of a ray, up to a distance from its origin: that in front of
+    /// something opaque there.
+    pub fn trace_to(&self, ray: &Ray, distance: f64) -> Light {
+        let Some(way) = self.clip(ray, distance) else { return Light::CLEAR };
         match self.grid.samples() {
             Samples::Rgb8(_) | Samples::Rgba8(_) => Light::CLEAR,
             samples => for_samples!(samples, |values| self.walk(values, &way); color _ => Light::CLEAR),
         }
     }
 
-    /// The part of a ray inside the domain, if it has a length.
-    fn clip(&self, ray: &Ray) -> Option<Way> {
+    /// The part of a ray inside the domain and before a distance, if it has a length.
+    fn clip(&self, ray: &Ray, distance: f64) -> Option<Way> {
         if self.num_cells.contains(&0) {
             return None;
         }
@@ -143,7 +159,8 @@ impl<'a> Tracer<'a> {
         let direction = ray.direction / spacing;
         let last = DVec3::from_array(self.num_cells.map(|n| n as f64));
         let [start, end] = inside(origin, direction, last, -entry)?;
-        Some(Way { origin, direction, start, end })
+        let end = end.min(distance - entry);
+        (start < end).then_some(Way { origin, direction, start, end })
     }
 
     fn walk<T: Sample>(&self, values: &[T], way: &Way) -> Light {
@@ -173,6 +190,9 @@ impl<'a> Tracer<'a> {
                 if light.transmittance <= OPAQUE {
                     return light;
                 }
+            }
+            if next >= way.end {
+                return light;
             }
             if way.direction[axis] > 0.0 {
                 cell[axis] = end[axis];
@@ -213,31 +233,11 @@ impl<'a> Tracer<'a> {
         let base = DVec3::from_array(cell.map(|c| c as f64));
         let local = |t: f64| (way.at(t) - base).clamp(DVec3::ZERO, DVec3::ONE);
         let field = cell::along(&corners, local(t[0]), local(t[1]));
-        // Far more unit distances than any picture can tell apart, yet safe to multiply.
-        let length = ((t[1] - t[0]) / self.bands.unit_distance()).min(1e300);
-        let piece = |band| Piece { field: &field, band, length, tolerance: self.tolerance };
-
-        let [low, high] = if low == high { [low, high] } else { field.range() };
-        if high - low <= ROUNDING * low.abs().max(high.abs()) {
-            piece(self.bands.at(low)).add_constant_to(light, low, 1.0);
-            return;
+        let length = (t[1] - t[0]) / self.bands.unit_distance();
+        if low == high {
+            return add_constant(light, self.bands.at(low), low, length.min(LONGEST));
         }
-        splits.clear();
-        splits.push(0.0);
-        if bands.len() > 1 {
-            field.splits(|low, high| self.bands.edges_between(low, high), |t| splits.push(t));
-            splits.sort_unstable_by(f64::total_cmp);
-        }
-        splits.push(1.0);
-        for ends in splits.windows(2) {
-            let band = self.bands.at(field.at(ends[0] + (ends[1] - ends[0]) / 2.0));
-            if ends[1] > ends[0] && !band.is_clear() {
-                piece(band).add_to(light, ends[0], ends[1]);
-                if light.transmittance <= OPAQUE {
-                    return;
-                }
-            }
-        }
+        Integrator { bands: &self.bands, tolerance: self.tolerance }.add(light, &field, length, splits);
     }
 }
 

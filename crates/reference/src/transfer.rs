@@ -58,6 +58,11 @@ impl Band {
         self.low.opacity == self.high.opacity && self.low.color == self.high.color
     }
 
+    /// From its lowest to its highest value; infinite outside the outermost control points.
+    pub(crate) fn width(&self) -> f64 {
+        1.0 / self.per_value
+    }
+
     /// The largest change of a colour channel per change of value.
     pub(crate) fn color_slope(&self) -> f64 {
         let change = |i: usize| (self.high.color[i] - self.low.color[i]).abs() * self.per_value;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::samples::{Sample, SampleType, Samples};
+use crate::samples::{SampleType, Samples};
 
 /// A regular grid of samples of any size and type.
 #[derive(Clone, Debug)]
@@ -139,17 +139,7 @@ impl VoxelGrid {
     /// When the grid has no such channel.
     pub fn value_range(&self, channel: usize) -> Option<[f64; 2]> {
         assert!(channel < self.sample_type().channels(), "channel {channel} of {}", self.sample_type());
-        fn range<T: Sample>(values: &[T], channel: usize) -> Option<[f64; 2]> {
-            let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-            for value in values {
-                let value = value.channel(channel);
-                if value.is_finite() {
-                    range = [range[0].min(value), range[1].max(value)];
-                }
-            }
-            (range[0] <= range[1]).then_some(range)
-        }
-        crate::for_samples!(&self.samples, |values| range(values, channel))
+        self.samples.range(channel)
     }
 }
 

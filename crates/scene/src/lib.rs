@@ -1,5 +1,5 @@
 //! What Volery draws and from where: a [`VoxelGrid`] or an [`UnstructuredGrid`], a
-//! [`TriangleMesh`], a [`Camera`], a [`TransferFunction`].
+//! [`TriangleMesh`], a [`Camera`], a [`TransferFunction`] or [`TransferFunction2d`].
 //!
 //! Plain data and its validation, in `f64`; every other crate of Volery speaks in these types.
 //!
@@ -16,18 +16,22 @@
 
 pub mod camera;
 pub mod grid;
+pub mod history;
 pub mod mesh;
 pub mod plane;
 pub mod samples;
 pub mod transfer;
+pub mod transfer2d;
 pub mod unstructured;
 
 pub use camera::{Camera, Projection, Ray, RayGrid};
 pub use grid::VoxelGrid;
+pub use history::History;
 pub use mesh::TriangleMesh;
 pub use plane::Plane;
 pub use samples::{Array, Sample, SampleType, Samples};
 pub use transfer::{ControlPoint, TransferFunction};
+pub use transfer2d::TransferFunction2d;
 pub use unstructured::{CellType, Cells, UnstructuredGrid};
 
 #[cfg(doctest)]

@@ -259,4 +259,22 @@ impl Samples {
     pub fn value(&self, index: usize, channel: usize) -> f64 {
         for_samples!(self, |values| values[index].channel(channel))
     }
+
+    /// Smallest and largest finite value of one channel; `None` if there is none.
+    ///
+    /// # Panics
+    /// When `channel` is out of range.
+    pub fn range(&self, channel: usize) -> Option<[f64; 2]> {
+        fn range<T: Sample>(values: &[T], channel: usize) -> Option<[f64; 2]> {
+            let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+            for value in values {
+                let value = value.channel(channel);
+                if value.is_finite() {
+                    range = [range[0].min(value), range[1].max(value)];
+                }
+            }
+            (range[0] <= range[1]).then_some(range)
+        }
+        for_samples!(self, |values| range(values, channel))
+    }
 }

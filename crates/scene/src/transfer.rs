@@ -144,7 +144,7 @@ impl TransferFunction {
     /// Extinction per world length of an opacity per unit distance: `-ln(1 - opacity) / unit_distance`.
     #[inline]
     pub fn extinction_of_opacity(&self, opacity: f64) -> f64 {
-        -(-opacity).ln_1p() / self.unit_distance
+        extinction(opacity, self.unit_distance)
     }
 
     /// The largest opacity of any value in `[low, high]`, exactly. Zero for an empty range, so for a
@@ -162,6 +162,12 @@ impl TransferFunction {
     pub fn is_transparent(&self, low: f64, high: f64) -> bool {
         self.max_opacity(low, high) == 0.0
     }
+}
+
+/// Extinction per world length of an opacity per unit distance.
+#[inline]
+pub(crate) fn extinction(opacity: f64, unit_distance: f64) -> f64 {
+    -(-opacity).ln_1p() / unit_distance
 }
 
 #[cfg(test)]

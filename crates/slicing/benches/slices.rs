@@ -3,7 +3,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use volery_scene::{CellType, Cells, UnstructuredGrid};
-use volery_slicing::{Planes, Refinement, Slicer};
+use volery_slicing::{Planes, Refinement, Slicer, node_gradients};
 
 const NODES: [usize; 3] = [40, 32, 32];
 
@@ -43,6 +43,9 @@ fn slices(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(count));
         group.sample_size(20);
         group.bench_function("prepare", |bencher| bencher.iter(|| Slicer::new(slicer.grid().clone())));
+        group.bench_function("gradients at nodes", |bencher| {
+            bencher.iter(|| node_gradients(slicer.grid(), heat));
+        });
         group.bench_function("slice", |bencher| bencher.iter(|| slicer.slice(&planes)));
         group.bench_function("positions and values", |bencher| {
             bencher.iter(|| {

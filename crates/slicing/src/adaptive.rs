@@ -8,7 +8,7 @@
 //! # Limits
 //! A polygon of a later step stands for the thickness of that step. Summed over steps that counts thin cells more
 //! than once: a cell thinner than the first distance is met by the first step with a probability that alone makes
-//! its mean right, and later steps add to it. The test `the_share_of_thin_cells_*` states by how much. A cell
+//! its mean right, and later steps add to it. [`Slicer::mesh_adaptively`] does without that bias. The test `the_share_of_thin_cells_*` states by how much. A cell
 //! without extent along the normal, or collapsed to a line, is never met.
 
 use std::collections::BTreeSet;
@@ -80,19 +80,12 @@ impl Slicer {
         normal: DVec3,
         refinement: Refinement,
     ) -> Result<(Stack, Vec<Step>), Error> {
-        let Refinement { first_planes, share } = refinement;
-        if !(0.0..=1.0).contains(&share) {
-            return Err(Error::Share { found: share });
-        }
-        if !(1..=Planes::MAX).contains(&first_planes) {
-            return Err(Error::FirstPlanes { found: first_planes });
-        }
-        let planes = Planes::over(self.grid(), normal, first_planes)?;
+        let planes = self.first_planes(normal, refinement)?;
         let [low, _] = extent(self.grid(), planes.normal())?;
         let mut stack = self.slice(&planes)?;
         let mut missed: Vec<bool> = (0..self.num_cells()).map(|cell| !self.is_blank(cell)).collect();
         let num_cells = missed.iter().filter(|&&missed| missed).count();
-        let allowed = num_cells - (share * num_cells as f64).ceil() as usize;
+        let allowed = num_cells - (refinement.share * num_cells as f64).ceil() as usize;
         let num_met = mark_met(&stack, &mut missed);
         let mut num_missed = num_cells - num_met;
         let (distance, num_polygons) = (planes.distance(), stack.num_polygons());
@@ -118,6 +111,18 @@ impl Slicer {
         Ok((stack, steps))
     }
 
+    /// The planes of the first step, for a refinement that says something sensible.
+    pub(crate) fn first_planes(&self, normal: DVec3, refinement: Refinement) -> Result<Planes, Error> {
+        let Refinement { first_planes, share } = refinement;
+        if !(0.0..=1.0).contains(&share) {
+            return Err(Error::Share { found: share });
+        }
+        if !(1..=Planes::MAX).contains(&first_planes) {
+            return Err(Error::FirstPlanes { found: first_planes });
+        }
+        Ok(Planes::over(self.grid(), normal, first_planes)?)
+    }
+
     /// Middles of slabs of a thickness, the first at `low`, that lie within cells.
     fn positions_for(&self, cells: &[bool], normal: DVec3, low: f64, distance: f64) -> Vec<f64> {
         let mut slabs = BTreeSet::new();
@@ -141,7 +146,7 @@ impl Slicer {
 }
 
 /// Takes the mark from every cell that has a polygon, and counts them.
-fn mark_met(stack: &Stack, missed: &mut [bool]) -> usize {
+pub(crate) fn mark_met(stack: &Stack, missed: &mut [bool]) -> usize {
     let cells = stack.sections().flat_map(|(_, section)| section.cells());
     cells.filter(|&&cell| std::mem::take(&mut missed[cell as usize])).count()
 }

@@ -17,6 +17,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use crate::buckets::Buckets;
+use crate::levels::Levels;
 use crate::planes::Planes;
 use crate::section::Section;
 use crate::slicer::Slicer;
@@ -36,15 +37,6 @@ pub enum Error {
         /// Number of planes.
         num_planes: usize,
     },
-}
-
-/// Where the nodes of a grid are against a family of planes.
-struct Levels<'a> {
-    planes: &'a Planes,
-    /// Of each node along the normal.
-    positions: Vec<f64>,
-    /// How many planes each node is above.
-    levels: Vec<u32>,
 }
 
 /// What a thread reuses from slice to slice: the vertex last made on each edge.
@@ -68,14 +60,23 @@ impl Slicer {
         planes: &Planes,
         wanted: impl Fn(usize) -> bool + Sync,
     ) -> Result<Stack, Error> {
-        let levels = Levels::new(self, planes);
+        self.slice_levels(&Levels::new(self.grid(), planes), wanted)
+    }
+
+    /// The same where the nodes have been put between the planes already.
+    pub(crate) fn slice_levels(
+        &self,
+        levels: &Levels<'_>,
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Result<Stack, Error> {
+        let planes = levels.planes;
         let slices_of = |cell: usize| {
             if self.is_blank(cell) || !wanted(cell) {
                 return 0..0;
             }
             let (_, nodes) = self.grid().cells().get(cell);
             let [low, high] = nodes.iter().fold([u32::MAX, 0], |[low, high], &node| {
-                let level = levels.levels[node as usize];
+                let level = levels.of(node);
                 [low.min(level), high.max(level)]
             });
             low..high
@@ -97,15 +98,7 @@ impl Slicer {
     }
 }
 
-impl<'a> Levels<'a> {
-    fn new(slicer: &Slicer, planes: &'a Planes) -> Self {
-        let normal = planes.normal();
-        let points = slicer.grid().points();
-        let positions: Vec<f64> = points.par_iter().map(|&point| normal.dot(point)).collect();
-        let levels = positions.par_iter().map(|&position| planes.num_at_or_below(position)).collect();
-        Self { planes, positions, levels }
-    }
-
+impl Levels<'_> {
     /// The polygons of one plane; `None` if no cell meets it.
     fn section(&self, slicer: &Slicer, slice: u32, buckets: &Buckets, notes: &mut Notes) -> Option<Section> {
         let num_cells = buckets.num_of(slice);
@@ -119,9 +112,11 @@ impl<'a> Levels<'a> {
         section.cells.reserve(num_cells);
         for cell in buckets.of(slice) {
             let ready = slicer.cell(cell as usize);
-            let above = ready.nodes.iter().enumerate().fold(0, |above, (place, &node)| {
-                above | u32::from(self.levels[node as usize] > slice) << place
-            });
+            let above = ready
+                .nodes
+                .iter()
+                .enumerate()
+                .fold(0, |above, (place, &node)| above | u32::from(self.of(node) > slice) << place);
             let vertex = |edge: u32| {
                 let note = notes[edge as usize];
                 if on_edges.get(note as usize) == Some(&edge) {
@@ -136,16 +131,7 @@ impl<'a> Levels<'a> {
             section.cells.resize(section.ends.len(), cell);
         }
         section.edges = on_edges.iter().map(|&edge| slicer.edges[edge as usize]).collect();
-        let plane = self.planes.positions()[slice as usize];
-        section.weights = section.edges.iter().map(|&edge| self.weight(plane, edge)).collect();
+        section.weights = section.edges.iter().map(|&edge| self.weight(slice, edge)).collect();
         (!section.ends.is_empty()).then_some(section)
-    }
-
-    /// The weight of the second node of an edge that crosses a plane.
-    fn weight(&self, plane: f64, edge: [u32; 2]) -> f32 {
-        let [from, to] = edge.map(|node| self.positions[node as usize]);
-        let weight = (plane - from) / (to - from);
-        // In [0, 1], since rounding keeps order; not a number where both differences overflow.
-        if weight.is_nan() { 0.0 } else { weight as f32 }
     }
 }

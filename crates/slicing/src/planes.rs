@@ -125,6 +125,17 @@ impl Planes {
         Plane { normal: self.normal, distance: self.positions[plane] }
     }
 
+    /// Where the slabs of the planes end: in the middle between two planes; of the first and the last plane half a
+    /// distance away. One more than planes, or none.
+    pub(crate) fn slab_ends(&self) -> Vec<f64> {
+        let (Some(first), Some(last)) = (self.positions.first(), self.positions.last()) else {
+            return Vec::new();
+        };
+        let half = 0.5 * self.distance;
+        let middles = self.positions.windows(2).map(|pair| pair[0] + 0.5 * (pair[1] - pair[0]));
+        std::iter::once(first - half).chain(middles).chain([last + half]).collect()
+    }
+
     /// How many planes lie at or below a position: the planes that a node there is above.
     pub(crate) fn num_at_or_below(&self, position: f64) -> u32 {
         let positions = self.positions.as_slice();

@@ -7,12 +7,13 @@
 //! edge like any other; else its corner in a section would lie on the line between its neighbours, and is left
 //! out. Both cells at a face take its nodes in the same order, so rounding cannot make them disagree.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 use rayon::prelude::*;
 use volery_scene::{CellType, UnstructuredGrid};
 
+use crate::outline::Outline;
 use crate::table::{Table, tables};
 
 /// Distance of a face's diagonals, over the length of the longer, up to which the face counts as planar. A
@@ -28,6 +29,7 @@ pub struct Slicer {
     cells: Vec<Cell>,
     /// Numbers of the edges of each cell, then of the diagonals of its faces if one of them is warped.
     cell_edges: Vec<u32>,
+    outline: OnceLock<Outline>,
 }
 
 /// Why a grid could not be made ready.
@@ -93,13 +95,8 @@ impl Slicer {
         }
         let pairs_of = |cell: usize| cells[cell].pairs(&grid, cell);
         let pairs: Vec<[u32; 2]> = (0..cells.len()).into_par_iter().flat_map_iter(pairs_of).collect();
-        let (edges, starts) = number_edges(grid.points().len(), &pairs);
-        let find = |&[low, high]: &[u32; 2]| {
-            let [start, end] = [starts[low as usize], starts[low as usize + 1]].map(|at| at as usize);
-            (start + edges[start..end].partition_point(|edge| edge[1] < high)) as u32
-        };
-        let cell_edges = pairs.par_iter().map(find).collect();
-        Ok(Self { grid, edges, cells, cell_edges })
+        let (edges, cell_edges) = number_edges(grid.points().len(), &pairs);
+        Ok(Self { grid, edges, cells, cell_edges, outline: OnceLock::new() })
     }
 
     /// The grid.
@@ -112,12 +109,41 @@ impl Slicer {
         self.edges.len()
     }
 
+    /// The outline of all cells that are not blank, made when it is first asked for.
+    pub(crate) fn outline(&self) -> &Outline {
+        self.outline.get_or_init(|| Outline::of_classes(self, 1, |_| Some(0)).pop().unwrap_or_default())
+    }
+
+    /// The middle of the outline's bounds.
+    pub(crate) fn middle(&self) -> DVec3 {
+        let points = self.outline().nodes.iter().map(|&node| self.grid.points()[node as usize]);
+        let bounds = points.map(|point| [point; 2]);
+        let bounds = bounds.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
+        bounds.map_or(DVec3::ZERO, |[low, high]| low + 0.5 * (high - low))
+    }
+
     pub(crate) fn num_cells(&self) -> usize {
         self.cells.len()
     }
 
     pub(crate) fn is_blank(&self, cell: usize) -> bool {
         self.cells[cell].kind == Kind::Blank
+    }
+
+    /// Gives the faces of a cell, around the outward normal.
+    pub(crate) fn for_faces(&self, cell: usize, mut give: impl FnMut(&[u32])) {
+        let (cell_type, nodes) = self.grid.cells().get(cell);
+        for places in cell_type.faces() {
+            let mut face = [0; 4];
+            let face = &mut face[..places.len()];
+            for (node, &place) in face.iter_mut().zip(*places) {
+                *node = nodes[usize::from(place)];
+            }
+            if self.cells[cell].is_flipped {
+                face.reverse();
+            }
+            give(face);
+        }
     }
 
     #[inline]
@@ -287,8 +313,8 @@ fn volume(cell_type: CellType, choice: u8, corners: &[DVec3; CellType::MAX_NODES
     sum
 }
 
-/// Every pair once, ascending, and where the pairs of each lower node start.
-fn number_edges(num_nodes: usize, pairs: &[[u32; 2]]) -> (Vec<[u32; 2]>, Vec<u32>) {
+/// Every pair once, ascending, and the place there of each pair as given.
+pub(crate) fn number_edges(num_nodes: usize, pairs: &[[u32; 2]]) -> (Vec<[u32; 2]>, Vec<u32>) {
     const RUN: usize = 4096;
     let mut starts = vec![0u32; num_nodes + 1];
     for &[low, _] in pairs {
@@ -319,7 +345,12 @@ fn number_edges(num_nodes: usize, pairs: &[[u32; 2]]) -> (Vec<[u32; 2]>, Vec<u32
         edges.extend(run);
     }
     firsts.push(edges.len() as u32);
-    (edges, firsts)
+    let find = |&[low, high]: &[u32; 2]| {
+        let [start, end] = [firsts[low as usize], firsts[low as usize + 1]].map(|at| at as usize);
+        (start + edges[start..end].partition_point(|edge| edge[1] < high)) as u32
+    };
+    let numbers = pairs.par_iter().map(find).collect();
+    (edges, numbers)
 }
 
 /// The pairs of a run of lower nodes, each once, and where those of each node start.

@@ -16,29 +16,43 @@ impl Section {
     /// # Panics
     /// When there are fewer positions than vertices.
     pub fn triangles(&self, normal: DVec3, positions: &[DVec3]) -> Vec<[u32; 3]> {
-        let mut triangles = Vec::with_capacity(self.corners().len() - 2 * self.num_polygons());
+        let mut triangles = Vec::with_capacity(self.num_triangles());
+        self.for_triangles(normal, |vertex| positions[vertex as usize], |triangle| triangles.push(triangle));
+        triangles
+    }
+
+    /// How many triangles there are in all polygons.
+    pub(crate) fn num_triangles(&self) -> usize {
+        self.corners().len() - 2 * self.num_polygons()
+    }
+
+    pub(crate) fn for_triangles(
+        &self,
+        normal: DVec3,
+        position: impl Fn(u32) -> DVec3,
+        mut give: impl FnMut([u32; 3]),
+    ) {
         let mut rest = Vec::new();
         for polygon in self.polygons() {
             let turn = |[a, b, c]: [u32; 3]| {
-                let [a, b, c] = [a, b, c].map(|vertex| positions[vertex as usize]);
+                let [a, b, c] = [a, b, c].map(&position);
                 normal.dot((b - a).cross(c - b))
             };
-            let is_same = |a: u32, b: u32| positions[a as usize] == positions[b as usize];
+            let is_same = |a: u32, b: u32| position(a) == position(b);
             let is_convex = (0..polygon.len()).all(|at| turn(around(polygon, at)) >= 0.0);
             if is_convex {
-                triangles.extend(polygon[1..].windows(2).map(|side| [polygon[0], side[0], side[1]]));
+                polygon[1..].windows(2).for_each(|side| give([polygon[0], side[0], side[1]]));
                 continue;
             }
             rest.clear();
             rest.extend_from_slice(polygon);
             while rest.len() > 3 {
                 let ear = ear(&rest, turn, is_same);
-                triangles.push(around(&rest, ear));
+                give(around(&rest, ear));
                 rest.remove(ear);
             }
-            triangles.push([rest[0], rest[1], rest[2]]);
+            give([rest[0], rest[1], rest[2]]);
         }
-        triangles
     }
 }
 

@@ -33,7 +33,8 @@ use volery_frame::{Cube, Cubes, Frame, Thickness, VolumeLayout};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::math::{axes, opacity_of_depth};
-use crate::tile::{TILE, assembled};
+use crate::surfaces::Surfaces;
+use crate::tile::{TILE, assembled, tile_behind};
 use bins::Bins;
 use fan_raster::Raster;
 use view::{PacketRays, View};
@@ -54,13 +55,13 @@ type Light = [[f32; 16]; 4];
 /// Draws a checked frame.
 pub(crate) fn draw(
     level: Level,
-    frame: &Frame<'_>,
+    (frame, surfaces): (&Frame<'_>, &Surfaces),
     content: &Cubes<'_>,
     layout: &VolumeLayout,
 ) -> Vec<[f32; 3]> {
     let view = View::new(frame, layout);
     let bins = Bins::new(level, content.cubes, layout, &view);
-    let shared = Shared { frame, content, layout, view, bins };
+    let shared = Shared { surfaces, content, layout, view, bins };
     let columns = frame.width.div_ceil(TILE);
     let tiles: Vec<Vec<[f32; 3]>> = (0..columns * frame.height.div_ceil(TILE))
         .into_par_iter()
@@ -73,7 +74,7 @@ pub(crate) fn draw(
 
 /// All that tiles share.
 struct Shared<'a> {
-    frame: &'a Frame<'a>,
+    surfaces: &'a Surfaces,
     content: &'a Cubes<'a>,
     layout: &'a VolumeLayout,
     view: View,
@@ -83,14 +84,15 @@ struct Shared<'a> {
 /// Draws one tile, whole even where it reaches over the edge of the picture.
 #[inline(always)]
 fn draw_tile<S: Simd>(simd: S, shared: &Shared<'_>, tile: u32, place: [u32; 2]) -> Vec<[f32; 3]> {
-    let background = shared.frame.background;
+    let first = place.map(|place| place * TILE);
+    let behind = tile_behind(shared.surfaces, first[0], first[1]);
     if shared.bins.is_empty(tile) {
-        return vec![background; (TILE * TILE) as usize];
+        return behind;
     }
     let mut rays = Vec::with_capacity(NUM_PACKETS);
     for packet in 0..NUM_PACKETS as u32 {
         let [x, y] = [packet % TILE_PACKETS, packet / TILE_PACKETS];
-        rays.push(shared.view.packet(place[0] * TILE + x * PACKET, place[1] * TILE + y * PACKET));
+        rays.push(shared.view.packet(first[0] + x * PACKET, first[1] + y * PACKET, shared.surfaces));
     }
     let mut light: Vec<Light> = vec![[[0.0; 16], [0.0; 16], [0.0; 16], [1.0; 16]]; NUM_PACKETS];
     let mut raster = match shared.content.thickness {
@@ -111,29 +113,33 @@ fn draw_tile<S: Simd>(simd: S, shared: &Shared<'_>, tile: u32, place: [u32; 2]) 
                 wanted &= wanted - 1;
                 let length = match lengths {
                     None => matter.length(simd, &rays[packet]),
-                    Some(lengths) => f32x16::from_slice(simd, &lengths[packet]),
+                    Some(lengths) => {
+                        let length = f32x16::from_slice(simd, &lengths[packet]);
+                        // What is left of it before a surface.
+                        length.min(matter.length_to_end(simd, &rays[packet]))
+                    }
                 };
                 if matter.add(simd, length, &mut light[packet]) {
                     open &= !(1 << packet);
                 }
             }
             if open == 0 {
-                return over(background, &light);
+                return over(behind, &light);
             }
         }
     }
-    over(background, &light)
+    over(behind, &light)
 }
 
-/// The pixels of a tile, row by row.
-fn over(background: [f32; 3], light: &[Light]) -> Vec<[f32; 3]> {
-    let mut pixels = vec![background; (TILE * TILE) as usize];
+/// The pixels of a tile, row by row, given those behind the cubes.
+fn over(behind: Vec<[f32; 3]>, light: &[Light]) -> Vec<[f32; 3]> {
+    let mut pixels = behind;
     for (packet, light) in (0..).zip(light) {
         let start = packet / TILE_PACKETS * PACKET * TILE + packet % TILE_PACKETS * PACKET;
         for lane in 0..16_u32 {
             let of = |channel: usize| light[channel][lane as usize];
-            pixels[(start + lane / PACKET * TILE + lane % PACKET) as usize] =
-                [0, 1, 2].map(|channel| of(channel) + of(3) * background[channel]);
+            let pixel = &mut pixels[(start + lane / PACKET * TILE + lane % PACKET) as usize];
+            *pixel = [0, 1, 2].map(|channel| of(channel) + of(3) * pixel[channel]);
         }
     }
     pixels
@@ -165,9 +171,9 @@ impl<S: Simd> Matter<S> {
         }
     }
 
-    /// How long the rays are in the cube, in unit lengths; 0 or below where they miss it.
+    /// Where the rays enter and leave the cube, in unit lengths; they miss it if they enter behind where they leave.
     #[inline(always)]
-    fn length(&self, simd: S, rays: &PacketRays) -> f32x16<S> {
+    fn depths(&self, simd: S, rays: &PacketRays) -> [f32x16<S>; 2] {
         let [x, y, z] = axes(
             #[inline(always)]
             |axis| {
@@ -178,8 +184,20 @@ impl<S: Simd> Matter<S> {
                 (a.min(b), a.max(b))
             },
         );
-        let enter = x.0.max(y.0).max(z.0).max(f32x16::splat(simd, 0.0));
-        x.1.min(y.1).min(z.1) - enter
+        [x.0.max(y.0).max(z.0).max(f32x16::splat(simd, 0.0)), x.1.min(y.1).min(z.1)]
+    }
+
+    /// How long the rays are in the cube, in unit lengths; 0 or below where they miss it.
+    #[inline(always)]
+    fn length(&self, simd: S, rays: &PacketRays) -> f32x16<S> {
+        let [enter, leave] = self.depths(simd, rays);
+        leave.min(f32x16::from_slice(simd, &rays.end)) - enter
+    }
+
+    /// How long they are from where they enter it to where they end.
+    #[inline(always)]
+    fn length_to_end(&self, simd: S, rays: &PacketRays) -> f32x16<S> {
+        f32x16::from_slice(simd, &rays.end) - self.depths(simd, rays)[0]
     }
 
     /// Puts the cube behind what a packet has seen; whether no ray wants more.

@@ -42,6 +42,8 @@ mod packet;
 mod plane;
 mod plane_field;
 mod pool;
+mod sheets;
+mod surfaces;
 mod texel;
 mod tile;
 mod walk;
@@ -54,6 +56,7 @@ use volery_frame::{
 };
 
 use crate::pool::{Pool, for_bricks};
+use crate::surfaces::Surfaces;
 
 /// A ray ends when its transmittance falls below this.
 pub const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
@@ -81,6 +84,30 @@ impl SoftwareBackend {
     /// An executor for the best instruction set of this machine.
     pub fn new() -> Self {
         Self { level: Level::new(), volume: None }
+    }
+
+    /// The pixels of a checked frame.
+    fn pixels(&self, frame: &Frame<'_>) -> Result<Vec<[f32; 3]>, DrawError> {
+        let surfaces = Surfaces::new(frame);
+        let scene = (frame, &surfaces);
+        if let Content::Sheets(content) = &frame.content {
+            return Ok(sheets::draw(self.level, scene, content));
+        }
+        let (layout, pool) = self.volume.as_ref().ok_or(DrawError::NoVolume)?;
+        match &frame.content {
+            Content::Rays(rays) => {
+                for_bricks!(pool, |bricks| tile::draw(self.level, scene, rays, layout, bricks))
+            }
+            Content::Cubes(content) => Ok(cubes::draw(self.level, scene, content, layout)),
+            Content::Planes(planes) => match pool {
+                Pool::U8(bricks) => plane::draw::<_, 1>(self.level, scene, planes, layout, bricks),
+                Pool::U16(bricks) => plane::draw::<_, 1>(self.level, scene, planes, layout, bricks),
+                Pool::F32(bricks) => plane::draw::<_, 1>(self.level, scene, planes, layout, bricks),
+                Pool::Colors(bricks) => plane::draw::<_, 4>(self.level, scene, planes, layout, bricks),
+            },
+            // Sheets belong to no volume.
+            Content::Sheets(content) => Ok(sheets::draw(self.level, scene, content)),
+        }
     }
 }
 
@@ -122,23 +149,7 @@ impl Backend for SoftwareBackend {
 
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
         check_frame(frame, self.volume.as_ref().map(|(layout, _)| layout), MAX_SIZE)?;
-        if let Content::Sheets(_) = &frame.content {
-            return Err(DrawError::Device("sheets are not drawn yet".to_owned()));
-        }
-        let (layout, pool) = self.volume.as_ref().ok_or(DrawError::NoVolume)?;
-        let pixels = match &frame.content {
-            Content::Rays(rays) => {
-                for_bricks!(pool, |bricks| tile::draw(self.level, frame, rays, layout, bricks))?
-            }
-            Content::Cubes(content) => cubes::draw(self.level, frame, content, layout),
-            Content::Sheets(_) => Vec::new(),
-            Content::Planes(planes) => match pool {
-                Pool::U8(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),
-                Pool::U16(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),
-                Pool::F32(bricks) => plane::draw::<_, 1>(self.level, frame, planes, layout, bricks),
-                Pool::Colors(bricks) => plane::draw::<_, 4>(self.level, frame, planes, layout, bricks),
-            }?,
-        };
+        let pixels = self.pixels(frame)?;
         let image = Image { width: frame.width, height: frame.height, pixels };
         Ok(Drawn { image, device_seconds: None })
     }

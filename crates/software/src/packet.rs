@@ -5,6 +5,7 @@ use glam::DVec3;
 use volery_scene::RayGrid;
 
 use crate::math::axes;
+use crate::surfaces::Surfaces;
 
 /// Pixels of a packet per axis; a lane is `column + 4 * row`.
 pub(crate) const PACKET: u32 = 4;
@@ -20,6 +21,8 @@ pub(crate) struct Packet<S: Simd> {
     /// `direction` and `inverse` in f32, both finite and neither zero.
     narrow_direction: [f32x16<S>; 3],
     narrow_inverse: [f32x16<S>; 3],
+    /// Where the rays end, in unit lengths.
+    end: Wide<S>,
 }
 
 /// What a packet does in one brick.
@@ -37,12 +40,12 @@ pub(crate) struct Span<S: Simd> {
 }
 
 impl<S: Simd> Packet<S> {
-    /// The rays of the packet whose upper left pixel is `(column, row)`. Pixels outside the picture are as
-    /// good as others.
+    /// The rays of the packet whose upper left pixel is `(column, row)`, to where surfaces are. Pixels outside the
+    /// picture are as good as others.
     #[inline(always)]
     pub(crate) fn new(
         simd: S,
-        rays: &RayGrid,
+        (rays, surfaces): (&RayGrid, &Surfaces),
         spacing: DVec3,
         unit_length: f64,
         column: u32,
@@ -50,8 +53,11 @@ impl<S: Simd> Packet<S> {
     ) -> Self {
         let mut origin = [[0.0_f64; 16]; 3];
         let mut direction = [[0.0_f64; 16]; 3];
+        let mut end = [f64::INFINITY; 16];
         for lane in 0..16 {
-            let ray = rays.pixel(column + lane % PACKET, row + lane / PACKET);
+            let [column, row] = [column + lane % PACKET, row + lane / PACKET];
+            let ray = rays.pixel(column, row);
+            end[lane as usize] = surfaces.distance(column, row) / unit_length;
             let o = ray.origin / spacing;
             let d = ray.direction * unit_length / spacing;
             for axis in 0..3 {
@@ -69,6 +75,7 @@ impl<S: Simd> Packet<S> {
             inverse: [0, 1, 2].map(|axis| wide(&inverse[axis])),
             narrow_direction: [0, 1, 2].map(|axis| narrow(&direction[axis])),
             narrow_inverse: [0, 1, 2].map(|axis| narrow(&inverse[axis])),
+            end: wide(&end),
         }
     }
 
@@ -126,7 +133,7 @@ impl<S: Simd> Packet<S> {
                 (a.min(b), a.max(b))
             },
         );
-        (x.0.max(y.0).max(z.0).max(f64x8::splat(simd, 0.0)), x.1.min(y.1).min(z.1))
+        (x.0.max(y.0).max(z.0).max(f64x8::splat(simd, 0.0)), x.1.min(y.1).min(z.1).min(self.end[half]))
     }
 
     /// Finest cells from the plane at `low` to half of the rays at `depth`.

@@ -14,6 +14,7 @@ use crate::math::axes;
 use crate::packet::PACKET;
 use crate::plane_field::Field;
 use crate::pool::Bricks;
+use crate::surfaces::Surfaces;
 use crate::texel::Texel;
 
 /// Denominators below this are beyond a plane's horizon.
@@ -22,6 +23,7 @@ const HORIZON: f32 = 1e-12;
 /// All that tiles share.
 struct Shared<'a, T> {
     frame: &'a Frame<'a>,
+    surfaces: &'a Surfaces,
     content: &'a Planes<'a>,
     layout: &'a VolumeLayout,
     tiles: PlaneTiles,
@@ -33,7 +35,7 @@ struct Shared<'a, T> {
 /// Draws a checked frame of texels of `C` channels.
 pub(crate) fn draw<T: Texel, const C: usize>(
     level: Level,
-    frame: &Frame<'_>,
+    (frame, surfaces): (&Frame<'_>, &Surfaces),
     content: &Planes<'_>,
     layout: &VolumeLayout,
     bricks: &Bricks<T>,
@@ -45,7 +47,7 @@ pub(crate) fn draw<T: Texel, const C: usize>(
     let grid = BrickGrid::new(layout, content.bricks);
     let stored = grid.bricks().iter().filter_map(|brick| bricks.get(&brick.placed.id)).collect();
     let tiles = PlaneTiles::new(frame, content.planes, layout);
-    let shared = Shared { frame, content, layout, tiles, grid, stored };
+    let shared = Shared { frame, surfaces, content, layout, tiles, grid, stored };
     let width = frame.width as usize;
     // Zeroes need no memory until a band is written, by the thread that draws it.
     let mut pixels = vec![[0.0; 3]; width * frame.height as usize];
@@ -67,27 +69,43 @@ fn draw_band<S: Simd, T: Texel, const C: usize>(
 ) {
     let width = shared.frame.width;
     let num_rows = (band.len() / width as usize) as u32;
-    band.fill(shared.frame.background);
+    for (pixel, color) in (0..).zip(&mut *band) {
+        *color = shared.surfaces.color(pixel % width, first_row + pixel / width);
+    }
     let mut planes: Vec<PlaneTile> = Vec::with_capacity(MAX_PLANES);
     for first_column in (0..width).step_by(TILE as usize) {
         planes.clear();
         planes.extend(shared.tiles.tile(first_column, first_row).flatten());
-        if planes.is_empty() {
-            continue;
-        }
+        let Some(PlaneTile { zero_depth, .. }) = planes.first().copied() else { continue };
         let num_columns = (width - first_column).min(TILE);
         for y in (0..num_rows).step_by(PACKET as usize) {
             for x in (0..num_columns).step_by(PACKET as usize) {
-                let lights = draw_packet::<S, T, C>(simd, shared, &planes, x, y);
+                let ends = depths_of_ends(shared, zero_depth, [first_column + x, first_row + y]);
+                let ends = f32x16::from_slice(simd, &ends);
+                let lights = draw_packet::<S, T, C>(simd, shared, &planes, [x, y], ends);
                 for (lane, light) in (0..).zip(&lights) {
                     let [x, y] = [x + lane % PACKET, y + lane / PACKET];
                     if x < num_columns && y < num_rows {
-                        band[(y * width + first_column + x) as usize] = light.over(shared.frame.background);
+                        let pixel = &mut band[(y * width + first_column + x) as usize];
+                        *pixel = light.over(*pixel);
                     }
                 }
             }
         }
     }
+}
+
+/// Where the rays of a packet end at surfaces, in the depths of its tile.
+#[inline(always)]
+fn depths_of_ends<T>(shared: &Shared<'_, T>, zero_depth: f64, [column, row]: [u32; 2]) -> [f32; 16] {
+    let mut ends = [f32::INFINITY; 16];
+    if !shared.surfaces.is_empty() {
+        for (lane, end) in (0..).zip(&mut ends) {
+            let depth = shared.surfaces.depth(column + lane % PACKET, row + lane / PACKET);
+            *end = ((depth - zero_depth) / shared.layout.spacing.max_element()) as f32;
+        }
+    }
+    ends
 }
 
 /// What a pixel has gathered, front to back.
@@ -167,14 +185,14 @@ impl<S: Simd> Hit<S> {
     }
 }
 
-/// The light of the sixteen pixels from `(column, row)` of the tile on.
+/// The light of the sixteen pixels from `(column, row)` of the tile on, to the depths at which their rays end.
 #[inline(always)]
 fn draw_packet<S: Simd, T: Texel, const C: usize>(
     simd: S,
     shared: &Shared<'_, T>,
     planes: &[PlaneTile],
-    column: u32,
-    row: u32,
+    [column, row]: [u32; 2],
+    ends: f32x16<S>,
 ) -> [Light; 16] {
     let mut lights = [Light { color: [0.0; 3], transmittance: 1.0 }; 16];
     let lane = |of: fn(usize) -> usize| std::array::from_fn(|i| of(i) as f32);
@@ -186,7 +204,8 @@ fn draw_packet<S: Simd, T: Texel, const C: usize>(
     let mut open = [0_u64; MAX_PLANES];
     let mut wanted = 0xffff;
     for (open, plane) in open.iter_mut().zip(planes) {
-        *open = Hit::new(simd, plane, shared.layout, x, y).lanes.to_bitmask();
+        let hit = Hit::new(simd, plane, shared.layout, x, y);
+        *open = (hit.lanes & hit.depth.simd_lt(ends)).to_bitmask();
     }
     while open.iter().any(|lanes| lanes & wanted != 0) {
         let mut nearest = f32x16::splat(simd, f32::INFINITY);

@@ -10,6 +10,7 @@ use crate::MIN_TRANSMITTANCE;
 use crate::brick::{Occupancy, StoredBrick, block_cells};
 use crate::packet::{PACKET, Packet};
 use crate::pool::Bricks;
+use crate::surfaces::Surfaces;
 use crate::texel::Texel;
 use crate::walk::{Light, MIN_PAIR_BINS, Matter, Table, walk};
 
@@ -35,11 +36,11 @@ struct Drawable<'a, T> {
 
 /// All that tiles share.
 struct Shared<'a, T> {
-    frame: &'a Frame<'a>,
     layout: &'a VolumeLayout,
     /// World length that the table's extinction refers to.
     unit_length: f64,
     rays: RayGrid,
+    surfaces: &'a Surfaces,
     table: Table<'a>,
     /// Front to back.
     drawables: Vec<Drawable<'a, T>>,
@@ -48,7 +49,7 @@ struct Shared<'a, T> {
 /// Draws a checked frame.
 pub(crate) fn draw<T: Texel>(
     level: Level,
-    frame: &Frame<'_>,
+    (frame, surfaces): (&Frame<'_>, &Surfaces),
     content: &Rays<'_>,
     layout: &VolumeLayout,
     bricks: &Bricks<T>,
@@ -76,7 +77,7 @@ pub(crate) fn draw<T: Texel>(
         restarts: transfer.restarts(),
     };
     let rays = frame.camera.rays(frame.width, frame.height);
-    let shared = Shared { frame, layout, unit_length: transfer.unit_length(), rays, table, drawables };
+    let shared = Shared { layout, unit_length: transfer.unit_length(), rays, surfaces, table, drawables };
 
     let columns = frame.width.div_ceil(TILE);
     let tiles: Vec<Vec<[f32; 3]>> = (0..columns * frame.height.div_ceil(TILE))
@@ -186,10 +187,16 @@ impl Projector {
     }
 }
 
+/// What is behind the matter of a tile that begins at `(column, row)`.
+pub(crate) fn tile_behind(surfaces: &Surfaces, column: u32, row: u32) -> Vec<[f32; 3]> {
+    (0..TILE * TILE).map(|pixel| surfaces.color(column + pixel % TILE, row + pixel / TILE)).collect()
+}
+
 /// Draws one tile, whole even where it reaches over the edge of the picture.
 #[inline(always)]
 fn draw_tile<S: Simd, T: Texel>(simd: S, shared: &Shared<'_, T>, tile_x: u32, tile_y: u32) -> Vec<[f32; 3]> {
-    let mut pixels = vec![shared.frame.background; (TILE * TILE) as usize];
+    let [first_column, first_row] = [tile_x * TILE, tile_y * TILE];
+    let mut pixels = tile_behind(shared.surfaces, first_column, first_row);
     let inside = |d: &Drawable<'_, T>| {
         let [[x0, y0], [x1, y1]] = d.tiles;
         (x0..=x1).contains(&tile_x) && (y0..=y1).contains(&tile_y)
@@ -200,12 +207,12 @@ fn draw_tile<S: Simd, T: Texel>(simd: S, shared: &Shared<'_, T>, tile_x: u32, ti
     }
     for y in (0..TILE).step_by(PACKET as usize) {
         for x in (0..TILE).step_by(PACKET as usize) {
-            let light = draw_packet(simd, shared, &drawables, tile_x * TILE + x, tile_y * TILE + y);
+            let light = draw_packet(simd, shared, &drawables, first_column + x, first_row + y);
             let [r, g, b]: [[f32; 16]; 3] = light.color.map(Into::into);
             let clear: [f32; 16] = light.transmittance.into();
             for lane in 0..16 {
                 let pixel = (y + lane as u32 / PACKET) * TILE + x + lane as u32 % PACKET;
-                let background = shared.frame.background;
+                let background = pixels[pixel as usize];
                 pixels[pixel as usize] = [
                     r[lane] + clear[lane] * background[0],
                     g[lane] + clear[lane] * background[1],
@@ -226,7 +233,8 @@ fn draw_packet<S: Simd, T: Texel>(
     row: u32,
 ) -> Light<S> {
     let unit_length = shared.unit_length;
-    let packet = Packet::new(simd, &shared.rays, shared.layout.spacing, unit_length, column, row);
+    let rays = (&shared.rays, shared.surfaces);
+    let packet = Packet::new(simd, rays, shared.layout.spacing, unit_length, column, row);
     let mut light = Light::none(simd);
     let mut wanted = mask32x16::splat(simd, true);
     for drawable in drawables {

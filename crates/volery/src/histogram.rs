@@ -5,7 +5,7 @@
 //! data have [`MAX_BINS`] bins over the range of their finite values. Blank samples are counted apart.
 
 use rayon::prelude::*;
-use volery_scene::{Sample, SampleType, VoxelGrid, for_samples};
+use volery_scene::{Sample, SampleType, Samples, VoxelGrid, for_samples};
 
 /// Most bins of a histogram.
 pub const MAX_BINS: usize = 1024;
@@ -13,7 +13,7 @@ pub const MAX_BINS: usize = 1024;
 /// Samples that one task counts.
 const CHUNK: usize = 1 << 20;
 
-/// Counts of the values of one channel of a grid.
+/// Counts of the values of one channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// Smallest and largest finite value.
@@ -34,12 +34,20 @@ impl Histogram {
     /// # Panics
     /// When the grid has no such channel.
     pub fn of(grid: &VoxelGrid, channel: usize) -> Option<Self> {
-        let [low, high] = grid.value_range(channel)?;
+        Self::of_samples(grid.samples(), channel)
+    }
+
+    /// As [`Histogram::of`], of samples wherever they are.
+    ///
+    /// # Panics
+    /// When the samples have no such channel.
+    pub fn of_samples(samples: &Samples, channel: usize) -> Option<Self> {
+        let [low, high] = samples.range(channel)?;
         let width = high - low;
         if !width.is_finite() {
             return None;
         }
-        let whole = !matches!(grid.sample_type(), SampleType::F32 | SampleType::F64);
+        let whole = !matches!(samples.sample_type(), SampleType::F32 | SampleType::F64);
         let (start, bin_width, num_bins) = if whole {
             // Bins of a whole number of values each, so that none counts more values than its neighbours.
             let values_per_bin = ((width + 1.0) / MAX_BINS as f64).ceil().max(1.0);
@@ -51,7 +59,7 @@ impl Histogram {
         };
         let mut histogram =
             Self { range: [low, high], start, bin_width, counts: vec![0; num_bins], blank: 0 };
-        let counted = for_samples!(grid.samples(), |values| histogram.count(values, channel));
+        let counted = for_samples!(samples, |values| histogram.count(values, channel));
         histogram.blank = counted.iter().map(|(_, blank)| blank).sum();
         for (counts, _) in counted {
             histogram.counts.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);

@@ -8,8 +8,10 @@ use volery_io::Volume;
 use crate::histogram::Histogram;
 
 mod grid;
+mod stack;
 
 pub use grid::{ArrayInfo, DefectInfo, GridInfo};
+pub use stack::StackInfo;
 
 /// Bins of the histogram in [`Info`].
 pub const NUM_BINS: usize = 32;

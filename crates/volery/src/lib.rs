@@ -22,26 +22,33 @@
 mod backend;
 pub mod error;
 pub mod fit;
+mod grid_session;
 pub mod histogram;
 pub mod info;
 mod input;
 pub mod output;
 pub mod report;
 mod session;
+mod stack_session;
 pub mod technique;
 mod texels;
 pub mod transfer;
 
 pub use backend::{BackendChoice, BackendError, open_backend};
+pub use grid_session::{
+    GridSession, OpenError as GridOpenError, SliceCounts, Slices, SlicesError, StepChange,
+};
 pub use histogram::Histogram;
-pub use info::{GridInfo, Info};
-pub use input::{Input, InputError, read_input};
+pub use info::{GridInfo, Info, StackInfo};
+pub use input::{Input, InputData, InputError, InputOptions, read_input};
 pub use report::Report;
 pub use session::{
     BACKGROUND, Focus, OpenError, Picture, PlaneView, Progressive, Refinements, RenderError, Session, Step,
     VerifyError, View, ViewOptions,
 };
+pub use stack_session::{OpenError as StackOpenError, StackSession};
 pub use technique::Technique;
+pub use technique::stack::{Slicing, StackView};
 pub use transfer::{ColorMap, Preset};
 
 pub use glam;
@@ -49,8 +56,10 @@ pub use volery_frame::{Backend, Device, DeviceKind, Image, Sampling, Thickness};
 pub use volery_io as io;
 pub use volery_reference as reference;
 pub use volery_scene::{
-    Camera, ControlPoint, Plane, Projection, SampleType, Samples, TransferFunction, VoxelGrid, camera, grid,
+    Camera, CellType, Cells, ControlPoint, Plane, Projection, SampleType, Samples, TransferFunction,
+    TransferFunction2d, UnstructuredGrid, VoxelGrid, camera, grid,
 };
+pub use volery_slicing::QuantizedMesh;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -2,14 +2,17 @@
 //!
 //! A field that is missing does not apply or is not known; it is never zero for unknown.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
+use volery_frame::{Device, DeviceKind};
 
 /// Everything about one picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// What was drawn.
     pub input: Input,
-    /// How: `raycast`, `plane`, `fans`.
+    /// How: `raycast`, `plane`, `fans`, `stack`.
     pub technique: &'static str,
     /// Of fans, how lengths in cubes were found: `exact` or `interpolated`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -38,10 +41,14 @@ pub struct Input {
     /// The file; missing for a volume from memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
-    /// `volume`, or `image` for a single slice.
+    /// `volume`, or `image` for a single slice, `grid` for cells, `stack` for slices from a file.
     pub kind: &'static str,
-    /// Samples along x, y, z.
-    pub dims: [usize; 3],
+    /// Samples along x, y, z; of volumes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dims: Option<[usize; 3]>,
+    /// Cells of each type that occurs; of grids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<BTreeMap<&'static str, usize>>,
     /// Type of a sample: `u8`, `f32`, ...
     pub scalar: &'static str,
 }
@@ -71,15 +78,19 @@ pub struct Seconds {
     /// Reading and decoding the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load: Option<f64>,
-    /// Building the pyramid.
+    /// Building the pyramid; of grids, numbering edges.
     pub build: f64,
-    /// Choosing and ordering the nodes, and integrating the transfer function.
+    /// Choosing and ordering the nodes or sheets, and integrating the transfer function.
     pub select: f64,
-    /// Making bricks resident, reading them included.
-    pub upload: f64,
+    /// Slicing; of grids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<f64>,
+    /// Making bricks resident, reading them included; of volumes. Slices are uploaded as they are drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub upload: Option<f64>,
     /// Drawing and reading the picture back.
     pub draw: f64,
-    /// What a user waits for per picture once data are loaded: select, upload, draw.
+    /// What a user waits for per picture once data are loaded: select, geometry, upload, draw.
     pub frame: f64,
 }
 
@@ -93,20 +104,27 @@ pub struct Frame {
 /// How much there was to do.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Work {
-    /// Nodes drawn.
-    pub nodes: usize,
-    /// Nodes drawn of each level, the finest first.
-    pub nodes_by_level: Vec<usize>,
-    /// Bricks that became resident for these frames.
-    pub bricks: usize,
-    /// What the backend holds after the last frame.
+    /// Nodes drawn; of volumes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<usize>,
+    /// Nodes drawn of each level, the finest first; of volumes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nodes_by_level: Option<Vec<usize>>,
+    /// Bricks that became resident for these frames; of volumes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bricks: Option<usize>,
+    /// What the backend holds after the last frame: bricks, or vertices and triangles of stacks.
     pub bytes_resident: u64,
-    /// Texels sent to the backend for these frames.
+    /// Texels, or vertices and triangles, sent to the backend for these frames.
     pub bytes_uploaded: u64,
-    /// Polygons in which planes cut the nodes drawn.
+    /// Polygons in which planes cut the nodes or cells drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polygons: Option<usize>,
-    /// Triangles of the fans of the cubes drawn, whichever way the backend takes to draw them.
+    /// Planes that met cells; of grids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slices: Option<usize>,
+    /// Triangles of the fans of the cubes drawn, whichever way the backend takes to draw them; of a stack, those of
+    /// its slices and of its outline.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub triangles: Option<usize>,
 }
@@ -148,6 +166,16 @@ pub struct Measured {
     pub measured_psnr_db: Option<f64>,
     /// What the truth was.
     pub against: &'static str,
+}
+
+impl Backend {
+    pub(crate) fn of(device: Device) -> Self {
+        let kind = match device.kind {
+            DeviceKind::Software => "software",
+            DeviceKind::Gpu | DeviceKind::CpuDevice => "wgpu",
+        };
+        Self { kind, device: device.name }
+    }
 }
 
 impl Report {

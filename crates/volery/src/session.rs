@@ -8,22 +8,25 @@ mod error;
 mod progressive;
 mod refine;
 mod reporting;
+mod times;
+mod verify;
 mod view;
 
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use glam::DVec3;
 use volery_frame::{
     Backend, Content, Cubes, Frame, Image, IntegratedTransfer, Planes, PointTransfer, Rays, Thickness,
     VolumeLayout,
 };
 use volery_pyramid::{CubeTree, Kind, Node, NodeSource, Pyramid};
-use volery_reference::{PlaneScene, Tracer, metrics};
+use volery_reference::{PlaneScene, Tracer};
 use volery_scene::{TransferFunction, VoxelGrid};
 
 use crate::fit;
 use crate::histogram::Histogram;
-use crate::report::{self, Report};
+use crate::report::Report;
 use crate::technique::parts::Parts;
 use crate::technique::residency::{self, Uploaded};
 use crate::technique::{Technique, fans, plane, raycast};
@@ -33,6 +36,7 @@ use crate::transfer::{self, Preset};
 pub use error::{OpenError, RenderError, VerifyError};
 pub use progressive::{Progressive, Step};
 pub use refine::Refinements;
+pub(crate) use times::Times;
 pub use view::{BACKGROUND, Focus, PlaneView, View, ViewOptions};
 
 /// A picture and its report.
@@ -84,19 +88,6 @@ impl Plan {
             Self::Planes(plan) => &plan.cut.nodes,
             Self::Cubes(_) => &[],
         }
-    }
-}
-
-/// What one frame took, in seconds.
-struct Times {
-    select: f64,
-    upload: f64,
-    draw: f64,
-}
-
-impl Times {
-    fn frame(&self) -> f64 {
-        self.select + self.upload + self.draw
     }
 }
 
@@ -176,10 +167,16 @@ impl Session {
         self.volume.value_range
     }
 
+    /// World position of the last sample; the first is at the origin.
+    pub fn extent(&self) -> DVec3 {
+        self.grid.extent()
+    }
+
     /// A view of everything that is visible, in full resolution: the camera as near as it can be, planes and
     /// transfer function as [`ViewOptions`] says where it has none.
     pub fn view(&self, options: &ViewOptions) -> View {
-        let ViewOptions { width, height, direction, orthographic, transfer, mut planes } = options.clone();
+        let ViewOptions { width, height, direction, orthographic, transfer, mut planes, stack } =
+            options.clone();
         let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
         let (camera, transfer) = match self.technique {
             Technique::Raycast | Technique::Fans => {
@@ -207,6 +204,8 @@ impl Session {
             tolerance: None,
             planes,
             thickness: Thickness::default(),
+            stack,
+            meshes: [].into(),
         }
     }
 
@@ -246,7 +245,8 @@ impl Session {
             let upload = start.elapsed().as_secs_f64();
             let start = Instant::now();
             let image = self.draw(view, &plan)?;
-            times.push(Times { select, upload, draw: start.elapsed().as_secs_f64() });
+            let draw = start.elapsed().as_secs_f64();
+            times.push(Times { select, geometry: None, upload: Some(upload), draw });
             last = Some((image, plan));
         }
         let (image, plan) = last.ok_or(RenderError::NoFrame)?;
@@ -319,7 +319,7 @@ impl Session {
             height: view.height,
             camera: view.camera,
             background: view.background.map(|c| c as f32),
-            meshes: &[],
+            meshes: &view.meshes,
             content,
         };
         Ok(self.backend.draw(&frame)?.image)
@@ -339,13 +339,9 @@ impl Session {
     ) -> Result<volery_reference::Image, VerifyError> {
         let View { width, height, .. } = *view;
         let truth = match self.technique {
-            Technique::Raycast | Technique::Fans => Tracer::new(&self.grid, &view.transfer)?.render(
-                &view.camera,
-                view.background,
-                width,
-                height,
-                progress,
-            )?,
+            Technique::Raycast | Technique::Fans => Tracer::new(&self.grid, &view.transfer)?
+                .among(&view.meshes)
+                .render(&view.camera, view.background, width, height, progress)?,
             Technique::Plane => {
                 let scene = PlaneScene {
                     grid: &self.grid,
@@ -353,19 +349,12 @@ impl Session {
                     transfer: &view.transfer,
                     nearest: view.planes.sampling == volery_frame::Sampling::Nearest,
                     is_transparent: view.planes.is_transparent,
+                    meshes: &view.meshes,
                 };
                 scene.render(&view.camera, view.background, [width, height], progress)?
             }
         };
-        let image = &picture.image;
-        let drawn = volery_reference::Image::from_f32(image.width, image.height, &image.pixels)?;
-        let found = metrics::compare(&drawn, &truth)?;
-        picture.report.error.get_or_insert_default().measured = Some(report::Measured {
-            measured_max: found.max,
-            measured_rmse: found.rmse,
-            measured_psnr_db: found.psnr_db.is_finite().then_some(found.psnr_db),
-            against: "reference f64",
-        });
+        picture.measure(&truth)?;
         Ok(truth)
     }
 }

@@ -2,18 +2,21 @@
 
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, IntegratedTransfer,
-    PlacedBrick, Planes, Rays, UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Cubes, Device, DeviceKind, DrawError, Drawn, Frame, Image,
+    IntegratedTransfer, PlacedBrick, Planes, Rays, Sheets, UploadError, VolumeLayout,
 };
 use volery_shaders::raycast;
 
 use crate::adapter::{self, OpenError};
 use crate::cubes::CubeFans;
 use crate::gpu::{Failure, Gpu};
-use crate::picture::{Band, draw_in_bands};
+use crate::picture::{Band, band_size, draw_in_bands};
 use crate::plane::Plane;
 use crate::pool::Pool;
 use crate::raycast::{Form, Raycast, Resources, transfer_texture, units_texture};
+use crate::sheets::SheetStacks;
+use crate::surfaces::Surfaces;
+use crate::tiles::Tiles;
 use crate::units::{Matter, Units};
 use crate::view::shader_frame;
 
@@ -25,7 +28,10 @@ pub struct WgpuBackend {
     gpu: Gpu,
     raycast: Raycast,
     plane: Plane,
+    tiles: Tiles,
     cubes: CubeFans,
+    sheets: SheetStacks,
+    surfaces: Surfaces,
     pool: Option<Pool>,
     prepared: Option<Prepared>,
     band: Option<Band>,
@@ -65,8 +71,22 @@ impl WgpuBackend {
             |failure: Failure| OpenError::Device { name: gpu.info.name.clone(), reason: failure.to_string() };
         let raycast = Raycast::new(&gpu).map_err(fail)?;
         let plane = Plane::new(&gpu).map_err(fail)?;
+        let tiles = Tiles::new(&gpu).map_err(fail)?;
         let cubes = CubeFans::new(&gpu).map_err(fail)?;
-        Ok(Self { gpu, raycast, plane, cubes, pool: None, prepared: None, band: None })
+        let sheets = SheetStacks::new(&gpu).map_err(fail)?;
+        let surfaces = Surfaces::new(&gpu).map_err(fail)?;
+        Ok(Self {
+            gpu,
+            raycast,
+            plane,
+            tiles,
+            cubes,
+            sheets,
+            surfaces,
+            pool: None,
+            prepared: None,
+            band: None,
+        })
     }
 
     /// Everything that depends on bricks and transfer function, made anew only where they changed.
@@ -109,20 +129,29 @@ impl WgpuBackend {
     }
 
     fn cast_rays(&mut self, frame: &Frame<'_>, rays: &Rays<'_>) -> Result<Drawn, Failure> {
+        if rays.bricks.is_empty() || self.pool.as_ref().is_none_or(|pool| pool.layout().cells.contains(&0)) {
+            return self.draw_surfaces(frame);
+        }
         self.prepare(rays)?;
         let (Some(pool), Some(prepared)) = (&self.pool, &self.prepared) else {
-            return Ok(background(frame));
+            return self.draw_surfaces(frame);
         };
-        let Some(atlas) = pool.texture() else { return Ok(background(frame)) };
+        let Some(atlas) = pool.texture() else { return self.draw_surfaces(frame) };
         let gpu = &self.gpu;
-        let pipeline = self.raycast.pipeline(gpu, prepared.form)?;
-        let mut shader_frame = shader_frame(frame, rays.transfer, pool.layout(), &prepared.units, pool);
+        let size = [frame.width, frame.height];
+        let surfaces = self.surfaces.of_frame(gpu, frame, band_size(gpu, size, raycast::TILE))?;
+        let form = Form { has_surfaces: !surfaces.is_empty(), ..prepared.form };
+        let pipeline = self.raycast.pipeline(gpu, form)?;
+        let held = (pool, &surfaces);
+        let mut shader_frame = shader_frame(frame, rays.transfer, pool.layout(), &prepared.units, held);
         let (units, transfer) = (&prepared.units_texture, &prepared.transfer_texture);
         let raycast = &self.raycast;
-        let bind =
-            |picture: &wgpu::Buffer, _| raycast.bind(gpu, &Resources { units, atlas, transfer, picture });
-        let size = [frame.width, frame.height];
-        draw_in_bands(gpu, &mut self.band, size, raycast::TILE, bind, |pass, bound, rows| {
+        let bind = |picture: &wgpu::Buffer, _| {
+            let surfaces = surfaces.view();
+            raycast.bind(gpu, &Resources { units, atlas, transfer, picture, surfaces })
+        };
+        let passes = (raycast::TILE, &surfaces);
+        draw_in_bands(gpu, &mut self.band, size, passes, bind, |pass, bound, rows| {
             (shader_frame.first_row, shader_frame.end_row) = (rows.start, rows.end);
             raycast.set_frame(gpu, &shader_frame);
             Raycast::encode(pass, &pipeline, bound, &shader_frame);
@@ -130,8 +159,42 @@ impl WgpuBackend {
     }
 
     fn draw_planes(&mut self, frame: &Frame<'_>, planes: &Planes<'_>) -> Result<Drawn, Failure> {
-        let Some(pool) = &self.pool else { return Ok(background(frame)) };
-        self.plane.draw(&self.gpu, pool, &mut self.band, frame, planes)
+        match &self.pool {
+            Some(pool) if !planes.bricks.is_empty() && !planes.planes.is_empty() => {
+                let kept = (&mut self.band, &mut self.surfaces);
+                self.plane.draw(&self.gpu, pool, kept, frame, planes)
+            }
+            _ => self.draw_surfaces(frame),
+        }
+    }
+
+    fn draw_cubes(&mut self, frame: &Frame<'_>, cubes: &Cubes<'_>) -> Result<Drawn, Failure> {
+        match &self.pool {
+            Some(pool) if !cubes.cubes.is_empty() => {
+                let surfaces = self.surfaces.of_frame(&self.gpu, frame, Tiles::size(frame))?;
+                let kept = (&mut self.tiles, &mut self.band);
+                self.cubes.draw(&self.gpu, pool.layout(), kept, (frame, &surfaces), cubes)
+            }
+            _ => self.draw_surfaces(frame),
+        }
+    }
+
+    fn draw_sheets(&mut self, frame: &Frame<'_>, sheets: &Sheets<'_>) -> Result<Drawn, Failure> {
+        if sheets.sheets.iter().all(|sheet| sheet.count == 0) {
+            return self.draw_surfaces(frame);
+        }
+        let surfaces = self.surfaces.of_frame(&self.gpu, frame, Tiles::size(frame))?;
+        let kept = (&mut self.tiles, &mut self.band);
+        self.sheets.draw(&self.gpu, kept, (frame, &surfaces), sheets)
+    }
+
+    /// The picture of a frame whose content shows nothing.
+    fn draw_surfaces(&mut self, frame: &Frame<'_>) -> Result<Drawn, Failure> {
+        let surfaces = self.surfaces.of_frame(&self.gpu, frame, Tiles::size(frame))?;
+        if surfaces.is_empty() {
+            return Ok(background(frame));
+        }
+        self.tiles.draw(&self.gpu, &mut self.band, (frame, &surfaces), |_| (), |_, ()| ())
     }
 }
 
@@ -166,22 +229,14 @@ impl Backend for WgpuBackend {
 
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
         check_frame(frame, self.pool.as_ref().map(Pool::layout), MAX_SIZE)?;
-        if let Content::Sheets(_) = &frame.content {
-            return Err(DrawError::Device("sheets are not drawn yet".to_owned()));
-        }
-        let pool = self.pool.as_ref().ok_or(DrawError::NoVolume)?;
-        if let Some(brick) = frame.content.bricks().find(|brick| !pool.resident().contains_key(&brick.id)) {
+        if let Some(brick) = frame.content.bricks().find(|brick| !self.is_resident(brick.id)) {
             return Err(DrawError::NotResident { id: brick.id });
         }
-        let has_bricks = frame.content.bricks().next().is_some();
         let drawn = match &frame.content {
-            Content::Rays(_) if !has_bricks || pool.layout().cells.contains(&0) => Ok(background(frame)),
             Content::Rays(rays) => self.cast_rays(frame, rays),
-            Content::Cubes(cubes) if cubes.cubes.is_empty() => Ok(background(frame)),
-            Content::Cubes(cubes) => self.cubes.draw(&self.gpu, pool.layout(), &mut self.band, frame, cubes),
-            Content::Sheets(_) => Ok(background(frame)),
-            Content::Planes(planes) if !has_bricks || planes.planes.is_empty() => Ok(background(frame)),
             Content::Planes(planes) => self.draw_planes(frame, planes),
+            Content::Cubes(cubes) => self.draw_cubes(frame, cubes),
+            Content::Sheets(sheets) => self.draw_sheets(frame, sheets),
         };
         drawn.map_err(|failure| DrawError::Device(failure.to_string()))
     }

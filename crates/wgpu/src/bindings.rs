@@ -1,8 +1,11 @@
-//! Layouts of bind groups from the shaders' reflection.
+//! Layouts of bind groups from the shaders' reflection, and what is bound.
 
 use std::num::NonZeroU64;
 
 use volery_shaders::{Binding, BindingKind, Dimension, Stages, TexelKind};
+use wgpu::util::DeviceExt as _;
+
+use crate::gpu::Gpu;
 
 /// The layout of a shader's only group.
 pub(crate) fn bind_group_layout(
@@ -51,4 +54,40 @@ fn stages(Stages { vertex, fragment, compute }: Stages) -> wgpu::ShaderStages {
     of(vertex, wgpu::ShaderStages::VERTEX)
         | of(fragment, wgpu::ShaderStages::FRAGMENT)
         | of(compute, wgpu::ShaderStages::COMPUTE)
+}
+
+/// A shader's only group, by the names of its resources.
+pub(crate) fn bind_group<'a>(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    bindings: &[Binding],
+    resource: impl Fn(&str) -> wgpu::BindingResource<'a>,
+) -> wgpu::BindGroup {
+    let entry = |b: &Binding| wgpu::BindGroupEntry { binding: b.binding, resource: resource(b.name) };
+    let entries: Vec<_> = bindings.iter().map(entry).collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+}
+
+/// The layout of a pipeline with one group.
+pub(crate) fn pipeline_layout(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::PipelineLayout {
+    gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: None,
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    })
+}
+
+pub(crate) fn shader_module(gpu: &Gpu, label: &str, source: &'static str) -> wgpu::ShaderModule {
+    let source = wgpu::ShaderSource::Wgsl(source.into());
+    gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
+}
+
+pub(crate) fn buffer<T: bytemuck::NoUninit>(
+    gpu: &Gpu,
+    label: &str,
+    contents: &[T],
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    let contents = bytemuck::cast_slice(contents);
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
 }

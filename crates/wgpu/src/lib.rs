@@ -24,6 +24,13 @@
 //! cube from back to front. On two cores llvmpipe draws 0.5 million cubes per second into 768x768 pixels (172,583 in
 //! 316 ms), two thirds of it the same in a picture of 64x64: vertices and triangles, on one thread.
 //!
+//! Sheets of triangles are rendered too, one indexed draw each, whose number tells the vertex stage the sheet's
+//! thickness. Vertices stay on the device under their revision, floats or the 12 bytes that the vertex stage decodes.
+//! The fragment stage knows the angle of its ray, so it has the length in matter also in perspective; an opacity below
+//! zero takes matter away, which blending in floats allows. On two cores llvmpipe draws 592,000 triangles in 256
+//! sheets, 10 million fragments, in 230 ms; 48 ms of them are the triangles, 120 ms their rasterising and blending.
+//! (`cargo bench -p volery-wgpu`)
+//!
 //! # Guarantees
 //! No panic: what a device refuses comes back as an error. The same frame gives the same bits on the same
 //! device.
@@ -46,6 +53,9 @@ mod picture;
 mod plane;
 mod pool;
 mod raycast;
+mod sheets;
+mod surfaces;
+mod tiles;
 mod units;
 mod view;
 

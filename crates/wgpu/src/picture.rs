@@ -7,6 +7,8 @@ use std::sync::mpsc;
 use volery_frame::{Drawn, Image};
 
 use crate::gpu::{Failure, Gpu};
+use crate::surfaces::FrameSurfaces;
+use crate::tiles::Tile;
 
 /// Bytes of a pixel: three f32.
 const PIXEL_BYTES: u64 = 12;
@@ -28,6 +30,11 @@ pub(crate) struct Band {
 struct Stamps {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
+}
+
+/// Pixels of the bands of a picture, the last of which may have fewer rows.
+pub(crate) fn band_size(gpu: &Gpu, [width, height]: [u32; 2], tile: u32) -> [u32; 2] {
+    [width, rows_per_band(gpu, width, height, tile).min(height)]
 }
 
 /// Rows of a band in pictures of this width: multiples of a tile.
@@ -63,19 +70,27 @@ impl<'a> Clock<'a> {
     }
 }
 
-/// Draws a picture band by band in one compute pass each: for a range of rows, `bind` gets the buffer to fill,
-/// `encode` adds the commands. Buffers are taken from `kept` where they fit, and left there.
+/// Draws a picture band by band, its surfaces and then the rest in one compute pass each: for a range of rows, `bind`
+/// gets the buffer to fill, `encode` adds the commands. Buffers are taken from `kept` where they fit, and left there.
 pub(crate) fn draw_in_bands(
     gpu: &Gpu,
     kept: &mut Option<Band>,
     size: [u32; 2],
-    tile: u32,
-    bind: impl FnMut(&wgpu::Buffer, Range<u32>) -> wgpu::BindGroup,
+    (tile, surfaces): (u32, &FrameSurfaces<'_>),
+    mut bind: impl FnMut(&wgpu::Buffer, Range<u32>) -> wgpu::BindGroup,
     mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, &wgpu::BindGroup, Range<u32>),
 ) -> Result<Drawn, Failure> {
-    draw_bands_in_passes(gpu, kept, size, tile, bind, |encoder, clock, bound, rows| {
+    let bind = |picture: &wgpu::Buffer, rows: Range<u32>| {
+        let band =
+            Tile { first: [0, rows.start], size: [size[0], rows.end - rows.start], picture_width: size[0] };
+        (bind(picture, rows), surfaces.bind(band))
+    };
+    draw_bands_in_passes(gpu, kept, size, tile, bind, |encoder, clock, (bound, behind), rows| {
+        if let Some(behind) = behind {
+            surfaces.encode(encoder, clock.at_start(), behind);
+        }
         let timestamp_writes = clock.at_end().map(|writes| wgpu::ComputePassTimestampWrites {
-            beginning_of_pass_write_index: Some(0),
+            beginning_of_pass_write_index: behind.is_none().then_some(0),
             ..writes
         });
         let descriptor = wgpu::ComputePassDescriptor { label: Some("volery picture"), timestamp_writes };

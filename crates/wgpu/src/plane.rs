@@ -11,8 +11,9 @@ use wgpu::util::DeviceExt as _;
 
 use crate::bindings::bind_group_layout;
 use crate::gpu::{Failure, Gpu};
-use crate::picture::{Band, draw_in_bands};
+use crate::picture::{Band, band_size, draw_in_bands};
 use crate::pool::Pool;
+use crate::surfaces::Surfaces;
 
 // What the shader and the rest of the crates must mean alike.
 const _: () = assert!(plane::TILE == volery_frame::plane_tiles::TILE);
@@ -22,8 +23,8 @@ const _: () = assert!(plane::BLANK == volery_shaders::raycast::BLANK);
 pub(crate) struct Plane {
     layout: wgpu::BindGroupLayout,
     module: wgpu::ShaderModule,
-    /// For texels that are values, and for colours; compiled when first needed.
-    pipelines: [Option<wgpu::ComputePipeline>; 2],
+    /// For texels that are values, and for colours; each without and with surfaces. Compiled when first needed.
+    pipelines: [[Option<wgpu::ComputePipeline>; 2]; 2],
     frame: wgpu::Buffer,
     prepared: Option<Prepared>,
 }
@@ -47,7 +48,7 @@ impl Plane {
                 label: Some(plane::LABEL),
                 source: wgpu::ShaderSource::Wgsl(plane::SOURCE.into()),
             }),
-            pipelines: [None, None],
+            pipelines: [[None, None], [None, None]],
             frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("volery plane frame"),
                 size: size_of::<plane::Frame>() as u64,
@@ -68,17 +69,25 @@ impl Plane {
         &mut self,
         gpu: &Gpu,
         pool: &Pool,
-        band: &mut Option<Band>,
+        (band, surfaces): (&mut Option<Band>, &mut Surfaces),
         frame: &Frame<'_>,
         content: &Planes<'_>,
     ) -> Result<Drawn, Failure> {
+        let size = [frame.width, frame.height];
+        let surfaces = surfaces.of_frame(gpu, frame, band_size(gpu, size, plane::TILE))?;
         let prepared = match self.prepared.take().filter(|prepared| prepared.is_of(pool, content)) {
             Some(prepared) => prepared,
             None => gpu.checked(|| Prepared::new(gpu, pool, content))?,
         };
-        let pipeline = self.pipeline(gpu, pool.layout().texel == TexelType::Rgba8)?;
+        let pipeline = self.pipeline(gpu, [pool.layout().texel == TexelType::Rgba8, !surfaces.is_empty()])?;
         let mut shader_frame = shader_frame(frame, content, pool, &prepared.grid);
         let view = PlaneTiles::new(frame, content.planes, pool.layout());
+        let depths_per_length = pool.layout().spacing.max_element().recip();
+        shader_frame.depths_per_length = depths_per_length as f32;
+        let shader_tile = |tile: PlaneTile| {
+            let offset = (surfaces.zero_depth() - tile.zero_depth) * depths_per_length;
+            plane::PlaneTile { surface_offset: offset as f32, ..shader_tile(tile) }
+        };
         let bind = |picture: &wgpu::Buffer, rows: Range<u32>| {
             let columns = (0..frame.width).step_by(plane::TILE as usize);
             let tiles: Vec<_> = rows
@@ -87,10 +96,11 @@ impl Plane {
                 .flat_map(|(column, row)| view.tile(column, row))
                 .map(|tile| tile.map_or_else(bytemuck::Zeroable::zeroed, shader_tile))
                 .collect();
-            self.bind(gpu, pool, &prepared, &buffer(gpu, "volery plane tiles", &tiles), picture)
+            let tiles = buffer(gpu, "volery plane tiles", &tiles);
+            self.bind(gpu, pool, &prepared, &tiles, (picture, surfaces.view()))
         };
-        let size = [frame.width, frame.height];
-        let drawn = draw_in_bands(gpu, band, size, plane::TILE, bind, |pass, bound, rows| {
+        let passes = (plane::TILE, &surfaces);
+        let drawn = draw_in_bands(gpu, band, size, passes, bind, |pass, bound, rows| {
             (shader_frame.first_row, shader_frame.end_row) = (rows.start, rows.end);
             gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&shader_frame));
             pass.set_pipeline(&pipeline);
@@ -108,7 +118,7 @@ impl Plane {
         pool: &Pool,
         prepared: &Prepared,
         tiles: &wgpu::Buffer,
-        picture: &wgpu::Buffer,
+        (picture, surfaces): (&wgpu::Buffer, &wgpu::TextureView),
     ) -> wgpu::BindGroup {
         let descriptor = wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -123,6 +133,7 @@ impl Plane {
                 "bricks" => prepared.bricks.as_entire_binding(),
                 "entries" => prepared.entries.as_entire_binding(),
                 "points" => prepared.points.as_entire_binding(),
+                "surfaces" => wgpu::BindingResource::TextureView(surfaces),
                 // A binding that the shader gains and this does not know fails as one of the wrong kind.
                 _ => picture.as_entire_binding(),
             })
@@ -140,9 +151,13 @@ impl Plane {
         })
     }
 
-    /// The pipeline for one kind of texels, compiled if this is the first frame that needs it.
-    fn pipeline(&mut self, gpu: &Gpu, has_colors: bool) -> Result<wgpu::ComputePipeline, Failure> {
-        let made = &mut self.pipelines[usize::from(has_colors)];
+    /// The pipeline for one kind of texels, and for surfaces or none, compiled if this is the first frame that needs it.
+    fn pipeline(
+        &mut self,
+        gpu: &Gpu,
+        [has_colors, has_surfaces]: [bool; 2],
+    ) -> Result<wgpu::ComputePipeline, Failure> {
+        let made = &mut self.pipelines[usize::from(has_colors)][usize::from(has_surfaces)];
         if let Some(pipeline) = made {
             return Ok(pipeline.clone());
         }
@@ -158,7 +173,10 @@ impl Plane {
                 module: &self.module,
                 entry_point: Some(plane::MAIN),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &[(plane::HAS_COLORS, f64::from(has_colors))],
+                    constants: &[
+                        (plane::HAS_COLORS, f64::from(has_colors)),
+                        (plane::HAS_SURFACES, f64::from(has_surfaces)),
+                    ],
                     ..Default::default()
                 },
                 cache: None,
@@ -221,11 +239,12 @@ fn shader_frame(frame: &Frame<'_>, content: &Planes<'_>, pool: &Pool, grid: &Bri
         is_nearest: (content.sampling == Sampling::Nearest).into(),
         is_transparent: content.is_transparent.into(),
         shows_bricks: content.shows_bricks.into(),
+        ..bytemuck::Zeroable::zeroed()
     }
 }
 
 fn shader_tile(tile: PlaneTile) -> plane::PlaneTile {
-    let PlaneTile { base, anchor, seen, dx, dy, shrink, first_depth } = tile;
+    let PlaneTile { base, anchor, seen, dx, dy, shrink, first_depth, zero_depth: _ } = tile;
     let rest = bytemuck::Zeroable::zeroed();
     plane::PlaneTile { base, is_seen: 1, seen, dx, dy, anchor, shrink, first_depth, ..rest }
 }

@@ -28,6 +28,8 @@ pub(crate) struct Form {
     pub(crate) has_restarts: bool,
     /// A cell may hold more optical depth than one pair of pieces takes.
     pub(crate) is_dense: bool,
+    /// Rays end at surfaces.
+    pub(crate) has_surfaces: bool,
 }
 
 impl Form {
@@ -37,6 +39,7 @@ impl Form {
             has_blanks,
             has_restarts: !rays.transfer.restarts().is_empty(),
             is_dense: rays.transfer.is_dense(layout, level),
+            has_surfaces: false,
         }
     }
 }
@@ -47,6 +50,7 @@ pub(crate) struct Resources<'a> {
     pub(crate) atlas: &'a wgpu::Texture,
     pub(crate) transfer: &'a wgpu::Texture,
     pub(crate) picture: &'a wgpu::Buffer,
+    pub(crate) surfaces: &'a wgpu::TextureView,
 }
 
 impl Raycast {
@@ -90,6 +94,7 @@ impl Raycast {
             "atlas" => wgpu::BindingResource::TextureView(&atlas),
             "atlas_sampler" => wgpu::BindingResource::Sampler(&self.sampler),
             "transfer" => wgpu::BindingResource::TextureView(&transfer),
+            "surfaces" => wgpu::BindingResource::TextureView(resources.surfaces),
             // A binding that the shader gains and this does not know fails as one of the wrong kind.
             _ => resources.picture.as_entire_binding(),
         };
@@ -153,6 +158,7 @@ fn pipeline(
                 (raycast::HAS_BLANKS, f64::from(form.has_blanks)),
                 (raycast::HAS_RESTARTS, f64::from(form.has_restarts)),
                 (raycast::IS_DENSE, f64::from(form.is_dense)),
+                (raycast::HAS_SURFACES, f64::from(form.has_surfaces)),
             ],
             ..Default::default()
         },

@@ -3,28 +3,31 @@
 use glam::DVec3;
 use volery_frame::integral::{MAX_RESTARTS, Restart};
 use volery_frame::{Frame, IntegratedTransfer, VolumeLayout};
-use volery_scene::{Projection, RayGrid};
+use volery_scene::RayGrid;
 use volery_shaders::raycast;
 
 use crate::pool::Pool;
+use crate::surfaces::FrameSurfaces;
 use crate::units::Units;
 
-/// The rays of a picture, which start near the volume: in perspective at the depth where the volume begins,
-/// so that nothing of it lies before their start and f32 loses nothing to a far eye.
-fn rays_near_volume(frame: &Frame<'_>, layout: &VolumeLayout) -> RayGrid {
-    let rays = frame.camera.rays(frame.width, frame.height);
-    let Projection::Perspective { .. } = frame.camera.projection else { return rays };
+/// The depth at which rays start: where the volume begins, so that nothing of it lies before their start and f32 loses
+/// nothing to a far eye.
+fn start_depth(frame: &Frame<'_>, layout: &VolumeLayout) -> f64 {
     let [_, _, forward] = frame.camera.axes();
     let extent = DVec3::from_array(layout.cells.map(f64::from)) * layout.spacing;
-    let depth_of = |corner: DVec3| (corner - frame.camera.eye).dot(forward);
     // The nearest corner is the one that lies most against the view.
     let nearest = DVec3::select(forward.cmplt(DVec3::ZERO), extent, DVec3::ZERO);
+    (nearest - frame.camera.eye).dot(forward).max(0.0)
+}
+
+/// The rays of a picture that start at a depth.
+fn rays_from(frame: &Frame<'_>, depth: f64) -> RayGrid {
+    let rays = frame.camera.rays(frame.width, frame.height);
     // The directions' part along `forward` is 1, so a depth is a factor.
-    let depth = depth_of(nearest).max(0.0);
     RayGrid {
         origin: rays.origin + rays.toward * depth,
-        origin_dx: rays.toward_dx * depth,
-        origin_dy: rays.toward_dy * depth,
+        origin_dx: rays.origin_dx + rays.toward_dx * depth,
+        origin_dy: rays.origin_dy + rays.toward_dy * depth,
         ..rays
     }
 }
@@ -44,9 +47,10 @@ pub(crate) fn shader_frame(
     transfer: &IntegratedTransfer,
     layout: &VolumeLayout,
     units: &Units,
-    pool: &Pool,
+    (pool, surfaces): (&Pool, &FrameSurfaces<'_>),
 ) -> raycast::Frame {
-    let rays = rays_near_volume(frame, layout);
+    let start_depth = start_depth(frame, layout);
+    let rays = rays_from(frame, start_depth);
     let in_cells = |v: DVec3| (v / layout.spacing).as_vec3().to_array();
     // Directions are only directions: of any length, so of one that f32 holds.
     let longest = rays.toward.length().max(f64::MIN_POSITIVE);
@@ -84,6 +88,8 @@ pub(crate) fn shader_frame(
         rows_per_slice: 1.0 / pool.slot().slices_per_row as f32,
         slot_height: pool.slot().size[1] as f32,
         num_restarts: transfer.restarts().len() as u32,
+        surface_offset: (surfaces.zero_depth() - start_depth) as f32,
+        cells_per_depth: (longest / spacing) as f32,
         restart_bins: restarts(transfer, |restart| [restart.bin as i32, 0, 0, 0]),
         restart_sums: restarts(transfer, |restart| restart.sums),
         ..bytemuck::Zeroable::zeroed()

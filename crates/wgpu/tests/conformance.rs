@@ -3,8 +3,10 @@
 //! Without a device every test fails, unless `VOLERY_WITHOUT_GPU` is set: then all are counted as ignored.
 
 mod cubes;
+mod sheets;
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use volery_frame::Image;
 use volery_frame::conformance::{ALL, Property};
 use volery_wgpu::WgpuBackend;
 
@@ -16,6 +18,7 @@ fn main() {
     let trials = ALL
         .iter()
         .chain(cubes::ALL)
+        .chain(sheets::ALL)
         .map(|&property| trial(property).with_ignored_flag(without_gpu))
         .collect();
     let conclusion = libtest_mimic::run(&arguments, trials);
@@ -31,4 +34,13 @@ fn trial((name, check): Property) -> Trial {
         check(&mut backend);
         Ok(())
     })
+}
+
+/// The largest difference from what a pixel should be.
+fn difference(image: &Image, expected: impl Fn(usize) -> f64) -> f64 {
+    let differences = image.pixels.iter().enumerate().flat_map(|(place, pixel)| {
+        let expected = expected(place);
+        pixel.map(|part| (f64::from(part) - expected).abs())
+    });
+    differences.fold(0.0, f64::max)
 }

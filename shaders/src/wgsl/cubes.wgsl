@@ -13,7 +13,8 @@ struct Frame {
     clip_x: vec4f,
     clip_y: vec4f,
     clip_w: vec4f,
-    // A position and 1 to the way from the plane where parallel rays start; zero in perspective.
+    // A position and 1 to its depth along the view, from that of the surfaces on; without these from the plane where
+    // parallel rays start on, and zero in perspective.
     depth: vec4f,
     // Directions of parallel rays, a unit vector, or zero in perspective.
     way: vec3f,
@@ -33,6 +34,9 @@ struct Frame {
     // The image point before the eye, and the slope of rays per pixel; no slope in parallel.
     center: vec2f,
     slope_per_pixel: vec2f,
+    // The depth of the plane through the eye, and lengths in lengths of the world.
+    eye_depth: f32,
+    units_per_length: f32,
 }
 
 struct Cube {
@@ -47,6 +51,8 @@ struct Cube {
 
 // Whether the length of the ray is exact, or interpolated on the screen.
 override IS_EXACT: bool = true;
+// Whether rays end at surfaces.
+override HAS_SURFACES: bool = false;
 
 // Cubes of an instance: their vertices are numbered by 16 bits.
 const BATCH: u32 = 6553;
@@ -69,11 +75,12 @@ const SERIES_DEPTH: f32 = 0.25;
 // By sides and first axis, as in `volery_cubefan::table::ASPECTS`: the corners of the ten vertices in 3 bits each
 // from the lowest, and the class above them.
 @group(0) @binding(2) var<storage, read> aspects: array<u32>;
+// Of each pixel of the tile, colour and depth in the world's lengths.
+@group(0) @binding(3) var surfaces: texture_2d<f32>;
 
 struct Vertex {
     @builtin(position) position: vec4f,
-    // Of the way from the eye to the exit: the part before the cube and the part in it. Then the entry's way from
-    // the plane where parallel rays start. Then thickness times depth, which divided by the depth is linear on the
+    // Of the way from the eye to the exit: the part before the cube and the part in it. Then the entry's depth. Then thickness times depth, which divided by the depth is linear on the
     // screen. (What is interpolated linearly by declaration is wrong on llvmpipe in triangles that are clipped.)
     @location(0) shares: vec4f,
     // Colour and extinction; that is below zero where a cube reaches behind the eye, for then nothing is linear on
@@ -112,6 +119,8 @@ struct Place {
     through: f32,
     // Whether a part of the cube is behind the eye.
     is_around_eye: bool,
+    // Whether the eye is in it: then rays enter where they start.
+    is_inside: bool,
 }
 
 fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
@@ -140,10 +149,10 @@ fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
     let least_depth = min(low * frame.clip_w.xyz, high * frame.clip_w.xyz);
     let is_around_eye = !is_parallel && least_depth.x + least_depth.y + least_depth.z <= 0.0;
     if !is_outside {
-        return Place(end, 1.0, 1.0, true);
+        return Place(end, 1.0, 1.0, true, true);
     }
     if !is_inner {
-        return Place(end, 1.0, 0.0, is_around_eye);
+        return Place(end, 1.0, 0.0, is_around_eye, false);
     }
     let before = near[first] / far[first];
     let through = size[first] / far[first];
@@ -154,7 +163,7 @@ fn place_of(number: u32, low_plane: vec3i, high_plane: vec3i) -> Place {
     let from_afar = end + clamp(-through * end_seen, least, most);
     let from_nearby = clamp(before * end_seen, low, high) - frame.anchor_from_eye;
     let drawn = select(from_afar, from_nearby, through > 0.5 && !is_parallel);
-    return Place(select(drawn, end, is_first), before, through, is_around_eye);
+    return Place(select(drawn, end, is_first), before, through, is_around_eye, false);
 }
 
 @vertex
@@ -176,7 +185,8 @@ fn fan(@builtin(vertex_index) vertex: u32, @builtin(instance_index) batch: u32) 
     out.position = vec4f(dot(frame.clip_x, position), dot(frame.clip_y, position), 0.5 * w, w);
     let reach = select(length(place.point + frame.anchor_from_eye), 1.0, frame.is_parallel != 0u);
     let thickness = reach * place.through / place.before;
-    out.shares = vec4f(place.before, place.through, dot(frame.depth, position), w * thickness);
+    let enter = select(dot(frame.depth, position), frame.eye_depth, place.is_inside);
+    out.shares = vec4f(place.before, place.through, enter, w * thickness);
     let extinction = min(min(cube.extinction, MAX_EXTINCTION) * frame.unit_length, MAX_EXTINCTION);
     out.matter = vec4f(cube.red, cube.green, cube.blue, select(extinction, -extinction, place.is_around_eye));
     return out;
@@ -191,15 +201,19 @@ fn opacity_of(depth: f32) -> f32 {
 
 @fragment
 fn matter(in: Vertex) -> @location(0) vec4f {
+    // Of a ray, length per depth; depth is one over `w`.
+    let slope = (in.position.xy - frame.center) * frame.slope_per_pixel;
+    let length_per_depth = sqrt(1.0 + dot(slope, slope));
     var thickness = in.shares.w * in.position.w;
     if IS_EXACT || in.matter.w < 0.0 {
-        // Of a ray, length per depth; depth is one over `w`.
-        let slope = (in.position.xy - frame.center) * frame.slope_per_pixel;
-        let length_per_depth = sqrt(1.0 + dot(slope, slope));
         thickness = length_per_depth * in.shares.y / (in.shares.x * in.position.w);
     }
     // Less what is before the start of the ray.
-    let length = max(thickness + min(in.shares.z, 0.0), 0.0);
+    var length = max(thickness + min(in.shares.z - frame.eye_depth, 0.0), 0.0);
+    if HAS_SURFACES {
+        let end = textureLoad(surfaces, vec2u(in.position.xy), 0).a * frame.units_per_length;
+        length = min(length, max((end - max(in.shares.z, frame.eye_depth)) * length_per_depth, 0.0));
+    }
     let opacity = opacity_of(min(length * abs(in.matter.w), OPAQUE_DEPTH));
     return vec4f(in.matter.rgb * opacity, opacity);
 }

@@ -30,6 +30,8 @@ struct Frame {
     is_nearest: u32,
     is_transparent: u32,
     shows_bricks: u32,
+    // Of surfaces.
+    depths_per_length: f32,
 }
 
 // A plane as one tile of the picture sees it.
@@ -46,6 +48,8 @@ struct PlaneTile {
     // Change of the denominator per pixel right and down.
     shrink: vec2f,
     first_depth: f32,
+    // What is added to the depth of surfaces to be one of the tile.
+    surface_offset: f32,
 }
 
 struct Brick {
@@ -61,6 +65,8 @@ struct Brick {
 
 // Whether texels are colours.
 override HAS_COLORS: bool = false;
+// Whether surfaces hide what is behind them.
+override HAS_SURFACES: bool = false;
 
 // Pixels per edge of a tile, which a workgroup draws.
 const TILE: u32 = 16;
@@ -86,6 +92,8 @@ const ROW_MASK: u32 = 0xffff;
 // The transfer function's control points: texel, colour, opacity.
 @group(0) @binding(5) var<storage, read> points: array<f32>;
 @group(0) @binding(6) var<storage, read_write> picture: array<f32>;
+// Of each pixel of this band, colour and depth in the world's lengths.
+@group(0) @binding(7) var surfaces: texture_2d<f32>;
 
 struct Hit {
     place: vec3f,
@@ -314,12 +322,22 @@ fn shade(light: Light, plane: u32, hit: Hit) -> Light {
     return add(sum, color.rgb, select(1.0, color.a, frame.is_transparent != 0u));
 }
 
-fn light_of(first_plane: u32, pixel: vec2f) -> vec3f {
+// Colour behind all planes, and the depth from which on nothing is seen, but for the offset of the tile.
+fn end_of(pixel_of_band: vec2u) -> vec4f {
+    if !HAS_SURFACES {
+        return vec4f(frame.background, BLANK);
+    }
+    let surface = textureLoad(surfaces, pixel_of_band, 0);
+    return vec4f(surface.rgb, surface.a * frame.depths_per_length);
+}
+
+fn light_of(first_plane: u32, pixel: vec2f, end: vec4f) -> vec3f {
     var light = Light(vec3f(0.0), 1.0);
     // Planes that the pixel has still to see.
     var open = 0u;
     for (var i = 0u; i < frame.num_planes; i++) {
-        open |= select(0u, 1u << i, hit_of(first_plane + i, pixel).is_inside);
+        let hit = hit_of(first_plane + i, pixel);
+        open |= select(0u, 1u << i, hit.is_inside && hit.depth < end.w + tiles[first_plane + i].surface_offset);
     }
     while open != 0u && light.transmittance > 0.0 {
         var nearest = NO_PLANE;
@@ -334,7 +352,7 @@ fn light_of(first_plane: u32, pixel: vec2f) -> vec3f {
         open &= ~(1u << nearest);
         light = shade(light, first_plane + nearest, hit_of(first_plane + nearest, pixel));
     }
-    return light.color + light.transmittance * frame.background;
+    return light.color + light.transmittance * end.rgb;
 }
 
 @compute @workgroup_size(16, 16)
@@ -345,7 +363,8 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) in_ti
     }
     let tiles_per_row = (frame.width + TILE - 1u) / TILE;
     let first_plane = (group.y * tiles_per_row + group.x) * frame.num_planes;
-    let color = light_of(first_plane, vec2f(in_tile.xy));
+    let end = end_of(pixel - vec2u(0u, frame.first_row));
+    let color = light_of(first_plane, vec2f(in_tile.xy), end);
     let index = 3u * ((pixel.y - frame.first_row) * frame.width + pixel.x);
     picture[index] = color.r;
     picture[index + 1u] = color.g;

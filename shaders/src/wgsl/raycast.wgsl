@@ -42,6 +42,10 @@ struct Frame {
     rows_per_slice: f32,
     slot_height: f32,
     num_restarts: u32,
+    // Of surfaces: what is added to their depth to count from the ray's start, and finest cells per depth for a
+    // direction of length 1 as the frame has it.
+    surface_offset: f32,
+    cells_per_depth: f32,
     // Of each restart of the antiderivatives: in x the first bin that counts from it, and what it leaves out.
     restart_bins: array<vec4i, MAX_RESTARTS>,
     restart_sums: array<vec4f, MAX_RESTARTS>,
@@ -53,6 +57,8 @@ override HAS_BLANKS: bool = false;
 override HAS_RESTARTS: bool = false;
 // Whether cells may be so dense that a pair of pieces is too few for them.
 override IS_DENSE: bool = false;
+// Whether rays end at surfaces.
+override HAS_SURFACES: bool = false;
 
 const MAX_RESTARTS: u32 = 8;
 
@@ -97,6 +103,8 @@ const CELLS_MASK: u32 = 1023;
 @group(0) @binding(3) var atlas_sampler: sampler;
 @group(0) @binding(4) var transfer: texture_2d<f32>;
 @group(0) @binding(5) var<storage, read_write> picture: array<f32>;
+// Of each pixel of this band, colour and depth.
+@group(0) @binding(6) var surfaces: texture_2d<f32>;
 
 struct Ray {
     start: vec3f,
@@ -106,6 +114,9 @@ struct Ray {
     rising: vec3f,
     // Optical depth per t of matter that has depth 1 per unit length.
     depth_per_t: f32,
+    // Where it ends, and what is seen there.
+    end: f32,
+    behind: vec3f,
 }
 
 struct Light {
@@ -146,12 +157,20 @@ fn largest(v: vec3f) -> f32 {
 fn ray_of_pixel(pixel: vec2u) -> Ray {
     let at = vec2f(pixel) + 0.5;
     let start = frame.origin + at.x * frame.origin_dx + at.y * frame.origin_dy;
-    let toward = normalize(frame.toward + at.x * frame.toward_dx + at.y * frame.toward_dy);
+    let way = frame.toward + at.x * frame.toward_dx + at.y * frame.toward_dy;
+    let toward = normalize(way);
     let rising = toward >= vec3f(0.0);
     // No component is zero, so that no face is infinitely far or NaN away.
     let direction = select(min(toward, vec3f(-1e-12)), max(toward, vec3f(1e-12)), rising);
     let depth_per_t = length(direction * frame.depth_per_cell);
-    return Ray(start, direction, 1.0 / direction, select(vec3f(0.0), vec3f(1.0), rising), depth_per_t);
+    var end = FAR;
+    var behind = frame.background;
+    if HAS_SURFACES {
+        let surface = textureLoad(surfaces, pixel - vec2u(0u, frame.first_row), 0);
+        end = (surface.a + frame.surface_offset) * frame.cells_per_depth * length(way);
+        behind = surface.rgb;
+    }
+    return Ray(start, direction, 1.0 / direction, select(vec3f(0.0), vec3f(1.0), rising), depth_per_t, end, behind);
 }
 
 // Where a gather reads the corners of a cell in the slice z of a brick.
@@ -251,7 +270,7 @@ fn light_along(ray: Ray) -> vec3f {
     let first_faces = (mix(frame.cells, vec3f(0.0), ray.rising) - ray.start) * ray.inverse;
     let last_faces = (mix(vec3f(0.0), frame.cells, ray.rising) - ray.start) * ray.inverse;
     var t = max(largest(first_faces), 0.0);
-    let t_end = smallest(last_faces);
+    let t_end = min(smallest(last_faces), ray.end);
     // The finest cell that the ray is in.
     var place = clamp(floor(ray.start + t * ray.direction), vec3f(0.0), frame.cells - 1.0);
     var light = Light(vec3f(0.0), 0.0, 1.0);
@@ -322,7 +341,7 @@ fn light_along(ray: Ray) -> vec3f {
         place = select(select(inside, beyond, faces <= vec3f(t_next)), place, vec3<bool>(is_start));
         t = t_next;
     }
-    return light.color + light.transmittance * frame.background;
+    return light.color + light.transmittance * ray.behind;
 }
 
 // Pixels of a tile in an order that keeps neighbours in one SIMD group of 8 or more.

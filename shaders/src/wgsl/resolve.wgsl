@@ -1,4 +1,4 @@
-// Copies a tile that was rendered to its place in a band of the picture.
+// Copies a tile that was rendered to its place in a band of the picture, over surfaces if there are any.
 
 struct Tile {
     // Its first pixel in the band, and its pixels.
@@ -8,19 +8,27 @@ struct Tile {
     band_width: u32,
 }
 
+// Whether the tile was rendered over nothing, and comes over surfaces.
+override HAS_SURFACES: bool = false;
+
 // Pixels per side of a workgroup.
 const GROUP: u32 = 8;
 
 @group(0) @binding(0) var<uniform> tile: Tile;
 @group(0) @binding(1) var rendered: texture_2d<f32>;
 @group(0) @binding(2) var<storage, read_write> picture: array<f32>;
+// Of each pixel of the tile, colour and depth.
+@group(0) @binding(3) var surfaces: texture_2d<f32>;
 
 @compute @workgroup_size(GROUP, GROUP)
 fn main(@builtin(global_invocation_id) pixel: vec3u) {
     if any(pixel.xy >= tile.size) {
         return;
     }
-    let color = textureLoad(rendered, pixel.xy, 0);
+    var color = textureLoad(rendered, pixel.xy, 0);
+    if HAS_SURFACES {
+        color += (1.0 - color.a) * textureLoad(surfaces, pixel.xy, 0);
+    }
     let place = tile.origin + pixel.xy;
     let index = 3u * (place.y * tile.band_width + place.x);
     picture[index] = color.r;

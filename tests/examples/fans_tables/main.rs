@@ -58,7 +58,7 @@ fn draw(session: &mut Session, view: &View) -> Result<Timed, Box<dyn Error>> {
     let seconds = frames[frames.len() / 2];
     Ok(Timed {
         image: last.image,
-        nodes: last.report.work.nodes,
+        nodes: last.report.work.nodes.unwrap_or_default(),
         triangles: last.report.work.triangles.unwrap_or_default(),
         select: seconds.select,
         draw: seconds.draw,
@@ -81,7 +81,7 @@ impl Engine {
         let input = read_scene(data, "engine");
         let view = view_of(&input);
         let open = |technique, choice| -> Result<Session, Box<dyn Error>> {
-            Ok(Session::open(input.volume.grid.clone(), open_backend(choice)?, technique)?)
+            Ok(Session::open(input.volume()?.grid.clone(), open_backend(choice)?, technique)?)
         };
         let fans = open(Technique::Fans, BackendChoice::Software)?;
         let gpu_fans = open(Technique::Fans, BackendChoice::Wgpu)?;

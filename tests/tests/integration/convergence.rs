@@ -24,6 +24,7 @@ fn view() -> View {
         tolerance: None,
         planes: PlaneView::default(),
         thickness: Thickness::default(),
+        meshes: [].into(),
     }
 }
 

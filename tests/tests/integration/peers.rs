@@ -36,7 +36,7 @@ impl Scene {
         Some(self.reference.get_or_init(|| {
             let input = read_scene(&data, self.name);
             let view = view_of(&input);
-            let tracer = Tracer::new(&input.volume.grid, &view.transfer).unwrap();
+            let tracer = Tracer::new(&input.volume().unwrap().grid, &view.transfer).unwrap();
             tracer.render(&view.camera, view.background, view.width, view.height, &|_| ()).unwrap()
         }))
     }
@@ -46,8 +46,12 @@ impl Scene {
         let data = data_folder(test)?;
         let make = || {
             let input = read_scene(&data, self.name);
-            let mut session =
-                Session::open(input.volume.grid.clone(), backend(choice, test)?, Technique::Raycast).unwrap();
+            let mut session = Session::open(
+                input.volume().unwrap().grid.clone(),
+                backend(choice, test)?,
+                Technique::Raycast,
+            )
+            .unwrap();
             Some(exact(&draw(&mut session, &view_of(&input)).image))
         };
         if choice == BackendChoice::Software {

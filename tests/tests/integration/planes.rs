@@ -18,7 +18,7 @@ const TOOTH: &str = "tooth16_103x94x161_uint16be.raw";
 
 fn read(data: &Path, name: &str) -> VoxelGrid {
     let input = volery::read_input(&data.join(name), None).unwrap_or_else(|error| panic!("{error}"));
-    input.volume.grid
+    input.volume().unwrap().grid.clone()
 }
 
 fn software(grid: VoxelGrid) -> Session {

@@ -46,8 +46,15 @@ fn tolerance_zero_is_the_full_resolution_bit_for_bit(choice: BackendChoice, test
         let full = whole_view(&session);
         let zero = View { tolerance: Some(0.0), ..full.clone() };
         let (full, zero) = (draw(&mut session, &full), draw(&mut session, &zero));
-        assert_eq!(full.report.work.nodes_by_level, zero.report.work.nodes_by_level, "{name}");
-        assert!(full.report.work.nodes_by_level[1..].iter().all(|&nodes| nodes == 0), "{name}");
+        assert_eq!(
+            full.report.work.nodes_by_level.as_ref().unwrap(),
+            zero.report.work.nodes_by_level.as_ref().unwrap(),
+            "{name}"
+        );
+        assert!(
+            full.report.work.nodes_by_level.as_ref().unwrap()[1..].iter().all(|&nodes| nodes == 0),
+            "{name}"
+        );
         assert_eq!(bits(&full.image), bits(&zero.image), "{name}");
     }
 }
@@ -60,10 +67,10 @@ fn error_falls_with_the_tolerance() {
     let mut coarser: Option<(f64, usize)> = None;
     for tolerance in [0.01, 0.003, 0.0] {
         let picture = draw(&mut session, &View { tolerance: Some(tolerance), ..view.clone() });
-        let by_level = picture.report.work.nodes_by_level;
+        let by_level = picture.report.work.nodes_by_level.as_ref().unwrap();
         let what = format!("tolerance {tolerance}, nodes by level {by_level:?}");
         let found = distance(&what, &exact(&picture.image), &full).rmse;
-        let nodes = picture.report.work.nodes;
+        let nodes = picture.report.work.nodes.unwrap();
         if let Some((rmse, fewer)) = coarser {
             assert!(nodes > fewer, "{nodes} nodes, expected more than the {fewer} of a larger tolerance");
             assert!(found < rmse, "rmse {found}, expected less than the {rmse} of a larger tolerance");
@@ -101,7 +108,7 @@ fn a_cut_of_real_data_shows_every_sample_within_the_tolerance() {
     let test = "a_cut_of_real_data_shows_every_sample_within_the_tolerance";
     let Some(data) = data_folder(test) else { return };
     let input = volery::read_input(&data.join("fuel_64x64x64_uint8.raw"), None).unwrap();
-    let grid = &input.volume.grid;
+    let grid = &input.volume().unwrap().grid;
     for kind in [Kind::Decimated, Kind::Averaged] {
         let pyramid = Pyramid::build(grid, kind, 8).unwrap();
         let layout = pyramid.layout();
@@ -167,7 +174,7 @@ fn the_number_of_threads_does_not_change_a_bit_of_real_data() {
     let view = view_of(&input);
     let picture_by = |threads: usize| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| bits(&draw(&mut software(input.volume.grid.clone()), &view).image))
+        pool.install(|| bits(&draw(&mut software(input.volume().unwrap().grid.clone()), &view).image))
     };
     let by_one = picture_by(1);
     for threads in [2, 7] {

@@ -7,7 +7,7 @@ use std::process::Command;
 use super::table;
 use crate::shell;
 
-/// Options of `cargo xtask bench planes` and `fans`.
+/// Options of `cargo xtask bench planes`, `fans` and `stacks`.
 #[derive(clap::Args)]
 pub(super) struct Options {
     /// Put the tables between the markers of the document, and the pictures beside it

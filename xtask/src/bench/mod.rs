@@ -1,6 +1,7 @@
 //! `cargo xtask bench`: criterion benches of all crates, Volery beside VTK, and the tables of documents.
 
 mod documents;
+mod grids;
 mod peers;
 mod reslice;
 mod table;
@@ -31,6 +32,8 @@ enum Which {
     Planes(documents::Options),
     /// Cubes as fans: time against error beside rays, and the picture of docs/fans.md.
     Fans(documents::Options),
+    /// Stacks of slices through grids: time and bytes against error, and the picture of docs/stacks.md.
+    Stacks(documents::Options),
 }
 
 /// Runs the benches asked for.
@@ -42,6 +45,7 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         Some(Which::Peers(options)) => peers::run(options),
         Some(Which::Planes(options)) => documents::run(options, "planes", "plane_tables"),
         Some(Which::Fans(options)) => documents::run(options, "fans", "fans_tables"),
+        Some(Which::Stacks(options)) => documents::run(options, "stacks", "stack_tables"),
         None => criterion(options.filter.as_deref()),
     }
 }

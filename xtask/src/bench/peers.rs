@@ -9,20 +9,22 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-use super::reslice;
 use super::table::{self, Row};
 use super::volery::Volery;
 use super::vtk::{self, Vtk};
+use super::{grids, reslice};
 use crate::shell;
 
 /// Options of `cargo xtask bench peers`.
 #[derive(clap::Args)]
 pub(super) struct Options {
-    /// Scenes by name; `plane_N` is an oblique plane in N x N pixels through the mouse
+    /// Scenes by name; `plane_N` is an oblique plane in N x N pixels through the mouse, `slices_FILE` slices through
+    /// a grid
     #[arg(
         long,
         value_delimiter = ',',
-        default_value = "engine,engine_inside,heptane,mri,tooth16,plane_512,plane_1024"
+        default_value = "engine,engine_inside,heptane,mri,tooth16,plane_512,plane_1024,bluntfin,k3d_fem,slices_bluntfin,\
+                         slices_post_mixed"
     )]
     scenes: Vec<String>,
     /// Frames per program, setting and round
@@ -43,8 +45,8 @@ pub(super) struct Options {
 pub(super) fn run(options: &Options) -> Result<(), String> {
     let data = shell::data_folder()?.ok_or("no folder ../shared/data, and VOLERY_DATA is not set")?;
     let folder = super::work_folder()?;
-    let is_rays = |name: &&String| reslice::side(name).is_none();
-    options.scenes.iter().filter(is_rays).try_for_each(|name| scene_file(&data, name).map(drop))?;
+    let has_file = |name: &&String| reslice::side(name).is_none() && grids::cut_file(name).is_none();
+    options.scenes.iter().filter(has_file).try_for_each(|name| scene_file(&data, name).map(drop))?;
     let volery = Volery::build(&folder)?;
     let mut vtk = Vtk::start(&folder)?;
     println!("{}", vtk.about);
@@ -53,49 +55,62 @@ pub(super) fn run(options: &Options) -> Result<(), String> {
     let mut devices = Vec::new();
     for name in &options.scenes {
         println!("== {name}");
-        if let Some(side) = reslice::side(name) {
-            let repeats = [options.frames, options.rounds];
-            let of_scene =
-                reslice::measure((&volery, &mut vtk), (&data, &folder), side, repeats, &mut devices)?;
-            println!("{}", table::markdown(&of_scene, &[]));
-            rows.extend(of_scene);
-            continue;
-        }
-        let scene = &scene_file(&data, name)?;
-        let reference = volery.write_reference(scene, &data, None)?;
-        vtk.load(scene, &data, &reference)?;
-        let mut of_vtk =
-            vtk::SETTINGS.map(|(mapper, step)| Row::new(name, vtk::program(mapper), &format!("step {step}")));
-        let mut of_volery =
-            BACKENDS.map(|backend| Some(Row::new(name, &format!("Volery {backend}"), "full resolution")));
-        for round in 0..options.rounds {
-            for (row, (mapper, step)) in of_vtk.iter_mut().zip(vtk::SETTINGS) {
-                vtk.draw(mapper, step, options.frames, row)?;
-            }
-            for (slot, backend) in of_volery.iter_mut().zip(BACKENDS) {
-                let Some(row) = slot else { continue };
-                match volery.draw((scene, &data), (backend, options.frames), &[], round == 0, row) {
-                    Ok(device) if devices.contains(&device) => {}
-                    Ok(device) => devices.push(device),
-                    Err(error) => {
-                        println!("{error}: left out");
-                        *slot = None;
-                    }
-                }
-            }
-        }
-        let of_scene: Vec<Row> = of_vtk.into_iter().chain(of_volery.into_iter().flatten()).collect();
+        let repeats = [options.frames, options.rounds];
+        let (programs, folders) = ((&volery, &mut vtk), (data.as_path(), folder.as_path()));
+        let of_scene = if let Some(side) = reslice::side(name) {
+            reslice::measure(programs, folders, side, repeats, &mut devices)?
+        } else if let Some(file) = grids::cut_file(name) {
+            grids::measure_cuts(programs, &data, (name, &file), repeats)?
+        } else if grids::is_grid(&scene_file(&data, name)?)? {
+            grids::measure(programs, folders, name, repeats, &mut devices)?
+        } else {
+            measure(programs, folders, name, repeats, &mut devices)?
+        };
         println!("{}", table::markdown(&of_scene, &[]));
         rows.extend(of_scene);
     }
     write(&rows, &about(options, &vtk.about, &devices), &folder, options.update_readme)
 }
 
+/// Measures a scene of a volume. Adds the devices that drew and are new.
+fn measure(
+    (volery, vtk): (&Volery, &mut Vtk),
+    (data, _): (&Path, &Path),
+    name: &str,
+    [frames, rounds]: [u32; 2],
+    devices: &mut Vec<String>,
+) -> Result<Vec<Row>, String> {
+    let scene = &scene_file(data, name)?;
+    let reference = volery.write_reference(scene, data, None)?;
+    vtk.load(scene, data, &reference)?;
+    let mut of_vtk =
+        vtk::SETTINGS.map(|(mapper, step)| Row::new(name, vtk::program(mapper), &format!("step {step}")));
+    let mut of_volery =
+        BACKENDS.map(|backend| Some(Row::new(name, &format!("Volery {backend}"), "full resolution")));
+    for round in 0..rounds {
+        for (row, (mapper, step)) in of_vtk.iter_mut().zip(vtk::SETTINGS) {
+            vtk.draw(mapper, step, frames, row)?;
+        }
+        for (slot, backend) in of_volery.iter_mut().zip(BACKENDS) {
+            let Some(row) = slot else { continue };
+            match volery.draw((scene, data), (backend, frames), &[], round == 0, row) {
+                Ok(device) if devices.contains(&device) => {}
+                Ok(device) => devices.push(device),
+                Err(error) => {
+                    println!("{error}: left out");
+                    *slot = None;
+                }
+            }
+        }
+    }
+    Ok(of_vtk.into_iter().chain(of_volery.into_iter().flatten()).collect())
+}
+
 /// Who draws of Volery.
 pub(super) const BACKENDS: [&str; 2] = ["software", "wgpu"];
 
 /// The scene files lie beside the data: `peers/scenes/NAME.json`.
-fn scene_file(data: &Path, name: &str) -> Result<PathBuf, String> {
+pub(super) fn scene_file(data: &Path, name: &str) -> Result<PathBuf, String> {
     let file = data.join("../peers/scenes").join(format!("{name}.json"));
     if file.is_file() { Ok(file) } else { Err(format!("{}: no such scene", file.display())) }
 }
@@ -112,7 +127,9 @@ fn about(options: &Options, vtk: &str, devices: &[String]) -> Vec<String> {
         ),
         "Programs take turns on each scene. Error of all channels in [0, 1] against Volery's f64 reference; VTK's \
          pictures have 8 bits (rounding alone is rmse .0011), Volery's 32; the last column is against VTK's own \
-         picture at 1/16 voxel."
+         picture at 1/16 voxel. The yardstick is the first row of VTK with a 1: the GPU ray cast at half a voxel, \
+         vtkImageReslice, the Bunyk ray cast, vtkCutter. VTK's mappers of grids are judged by their own meaning of \
+         opacity, and draw tetrahedra that are made before."
             .to_owned(),
     ]
 }

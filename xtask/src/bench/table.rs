@@ -26,6 +26,8 @@ pub(super) struct Row {
     pub(super) setting: String,
     /// Of each frame of each round.
     pub(super) seconds: Vec<f64>,
+    /// Polygons that were made, where that is the work.
+    pub(super) polygons: Option<u64>,
     /// Against the f64 reference.
     pub(super) reference: Option<Error>,
     /// Against the program's own converged picture, where it has one.
@@ -35,13 +37,22 @@ pub(super) struct Row {
 impl Row {
     pub(super) fn new(scene: &str, program: &str, setting: &str) -> Self {
         let [scene, program, setting] = [scene, program, setting].map(str::to_owned);
-        Self { scene, program, setting, seconds: Vec::new(), reference: None, own_converged: None }
+        Self {
+            scene,
+            program,
+            setting,
+            seconds: Vec::new(),
+            polygons: None,
+            reference: None,
+            own_converged: None,
+        }
     }
 
-    /// Adds what VTK answers.
+    /// Adds what VTK answers, or an example of ours.
     pub(super) fn take(&mut self, reply: &Value) -> Result<(), String> {
-        let seconds = reply["seconds"].as_array().ok_or_else(|| format!("VTK answers {reply}"))?;
+        let seconds = reply["seconds"].as_array().ok_or_else(|| format!("no seconds in {reply}"))?;
         self.seconds.extend(seconds.iter().filter_map(Value::as_f64));
+        self.polygons = reply["polygons"].as_u64();
         self.reference = Error::read(&reply["errors"]["reference"]);
         self.own_converged = Error::read(&reply["errors"]["vtk_converged"]);
         Ok(())
@@ -62,11 +73,17 @@ const YARDSTICK: (&str, &str) = ("VTK GPU ray cast", "step 0.5");
 /// The same for planes.
 pub(super) const RESLICE: (&str, &str) = ("vtkImageReslice", "linear");
 
+/// The same for grids.
+pub(super) const BUNYK: (&str, &str) = ("VTK Bunyk ray cast", "as tetrahedra");
+
+/// The same for slices.
+pub(super) const CUTTER: (&str, &str) = ("vtkCutter", "256 planes");
+
 /// Times of a row over those of the yardstick on the same scene.
 fn ratio(rows: &[Row], row: &Row) -> Option<f64> {
     let is_yardstick = |other: &&Row| {
         let program = (other.program.as_str(), other.setting.as_str());
-        other.scene == row.scene && [YARDSTICK, RESLICE].contains(&program)
+        other.scene == row.scene && [YARDSTICK, RESLICE, BUNYK, CUTTER].contains(&program)
     };
     Some(row.milliseconds()?.0 / rows.iter().find(is_yardstick)?.milliseconds()?.0)
 }
@@ -74,7 +91,7 @@ fn ratio(rows: &[Row], row: &Row) -> Option<f64> {
 /// A table in Markdown; `about` are lines that say where and how it was measured.
 pub(super) fn markdown(rows: &[Row], about: &[String]) -> String {
     let mut text = String::from(
-        "| scene | program | setting | ms, median (min) | of VTK GPU .5, of reslice | rmse | max | rmse to VTK's own |\n\
+        "| scene | program | setting | ms, median (min) | of yardstick | rmse | max | rmse to VTK's own |\n\
          |---|---|---|---|---|---|---|---|\n",
     );
     let number =
@@ -82,10 +99,14 @@ pub(super) fn markdown(rows: &[Row], about: &[String]) -> String {
     for row in rows {
         let times =
             row.milliseconds().map_or("-".to_owned(), |(median, min)| format!("{median:.1} ({min:.1})"));
+        let setting = match row.polygons {
+            None => row.setting.clone(),
+            Some(polygons) => format!("{}, {polygons} polygons", row.setting),
+        };
         let line = [
             row.scene.clone(),
             row.program.clone(),
-            row.setting.clone(),
+            setting,
             times,
             number(ratio(rows, row), 3),
             number(row.reference.map(|error| error.rmse), 5),
@@ -107,7 +128,7 @@ pub(super) fn json(rows: &[Row], about: &[String]) -> Value {
     let row = |row: &Row| {
         json!({"scene": row.scene, "program": row.program, "setting": row.setting, "seconds": row.seconds,
             "median_ms": row.milliseconds().map(|(median, _)| median), "ratio_to_vtk_gpu_half": ratio(rows, row),
-            "error_to_reference": error(row.reference), "error_to_own_converged": error(row.own_converged)})
+            "polygons": row.polygons, "error_to_reference": error(row.reference), "error_to_own_converged": error(row.own_converged)})
     };
     json!({"about": about, "rows": rows.iter().map(row).collect::<Vec<_>>()})
 }

@@ -13,6 +13,7 @@ use crate::shell;
 pub(super) struct Volery {
     program: PathBuf,
     reference_picture: PathBuf,
+    slice_rate: PathBuf,
     folder: PathBuf,
 }
 
@@ -22,13 +23,14 @@ impl Volery {
     /// # Errors
     /// When it does not build.
     pub(super) fn build(folder: &Path) -> Result<Self, String> {
-        // In one go, so that both are built with the same features and share their dependencies.
-        let both = ["--bin", "volery", "--example", "reference_picture"];
-        shell::run(shell::cargo(&["build", "--release", "--workspace"]).args(both))?;
+        // In one go, so that all are built with the same features and share their dependencies.
+        let all = ["--bin", "volery", "--example", "reference_picture", "--example", "slice_rate"];
+        shell::run(shell::cargo(&["build", "--release", "--workspace"]).args(all))?;
         let release = shell::target_folder(&shell::metadata()?)?.join("release");
         Ok(Self {
             program: release.join("volery"),
             reference_picture: release.join("examples/reference_picture"),
+            slice_rate: release.join("examples/slice_rate"),
             folder: folder.to_path_buf(),
         })
     }
@@ -43,6 +45,22 @@ impl Volery {
         let output = self.folder.join("reference.npy");
         shell::run(Command::new(&self.reference_picture).args([scene, data, &output]).args(plane))?;
         Ok(output)
+    }
+
+    /// Cuts a grid by parallel planes and adds times and number of polygons to the row.
+    pub(super) fn slice(
+        &self,
+        grid: &Path,
+        count: u32,
+        normal: [f64; 3],
+        repeats: u32,
+        row: &mut Row,
+    ) -> Result<(), String> {
+        let normal = normal.map(|x| x.to_string()).join(",");
+        let mut command = Command::new(&self.slice_rate);
+        command.arg(grid).args([count.to_string(), normal, repeats.to_string()]);
+        let text = shell::read(&mut command)?;
+        row.take(&serde_json::from_str(&text).map_err(|error| format!("slice_rate: {error}"))?)
     }
 
     /// Draws a scene and adds the times to the row; `verify` fills in its error.

@@ -90,6 +90,29 @@ impl Vtk {
         row.take(&reply)
     }
 
+    /// Loads the grid of a scene as tetrahedra; `reference` is its true picture by VTK's meaning of opacity.
+    pub(super) fn load_grid(&mut self, scene: &Path, data: &Path, reference: &Path) -> Result<(), String> {
+        let request = json!({"do": "load_grid", "scene": scene, "data": data, "reference": reference});
+        self.ask(&request).map(drop)
+    }
+
+    /// Draws the loaded grid and adds the times to the row.
+    pub(super) fn draw_grid(&mut self, mapper: &str, frames: u32, row: &mut Row) -> Result<(), String> {
+        let reply = self.ask(&json!({"do": "draw_grid", "mapper": mapper, "frames": frames}))?;
+        row.take(&reply)
+    }
+
+    /// Loads a grid to be cut by `count` planes.
+    pub(super) fn load_cut(&mut self, file: &Path, count: u32, normal: [f64; 3]) -> Result<(), String> {
+        self.ask(&json!({"do": "load_cut", "file": file, "count": count, "normal": normal})).map(drop)
+    }
+
+    /// Cuts the loaded grid and adds the times and the number of polygons to the row.
+    pub(super) fn cut(&mut self, frames: u32, row: &mut Row) -> Result<(), String> {
+        let reply = self.ask(&json!({"do": "cut", "frames": frames}))?;
+        row.take(&reply)
+    }
+
     fn ask(&mut self, request: &Value) -> Result<Value, String> {
         let failed = |error: std::io::Error| format!("VTK: {error}");
         writeln!(self.requests, "{request}").map_err(failed)?;

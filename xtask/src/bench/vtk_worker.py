@@ -5,11 +5,17 @@
   {"do": "draw", "mapper": "gpu"|"fixed", "step": VOXELS, "frames": N}   {"seconds": [..], "errors": {..}}
   {"do": "load_plane", "scene": FILE, "data": DIR, "reference": NPY}     {"name", "dims"}
   {"do": "reslice", "frames": N}                                         {"seconds": [..], "errors": {..}}
+  {"do": "load_grid", "scene": FILE, "data": DIR, "reference": NPY}      {"name", "cells"}
+  {"do": "draw_grid", "mapper": "bunyk"|"tetrahedra", "frames": N}       {"seconds": [..], "errors": {..}}
+  {"do": "load_cut", "file": FILE, "count": N, "normal": [X, Y, Z]}      {"cells"}
+  {"do": "cut", "frames": N}                                             {"seconds": [..], "polygons": N}
 
 A draw makes a window, draws one frame that is not timed (upload, shader compilation) and keeps it as the picture,
 then times N frames with the camera turned by a ten-thousandth of a degree between them. A frame ends when OpenGL has
 finished; reading it back is not in the time. Errors are of the whole picture, channel by channel, in [0, 1]:
 against the f64 reference, and against VTK's own picture at a sixteenth of a voxel. VTK's picture has 8 bits a channel.
+VTK's mappers of grids draw tetrahedra, made before and not in the time, and take a control point's opacity for an
+extinction per unit distance: the reference given for them is to have that meaning.
 """
 
 import gzip
@@ -88,6 +94,43 @@ def mapper_of(kind, step_world):
     return mapper
 
 
+def read_grid(file):
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(file)
+    reader.Update()
+    return reader.GetOutput()
+
+
+class Cut:
+    """A grid cut by parallel planes, evenly over its extent, the first half a distance inside, by vtkCutter."""
+
+    def __init__(self, file, count, normal):
+        self.grid = read_grid(file)
+        normal = np.array(normal) / np.linalg.norm(normal)
+        along = vtk_to_numpy(self.grid.GetPoints().GetData()).astype(float) @ normal
+        low, high = along.min(), along.max()
+        plane = vtk.vtkPlane()
+        plane.SetNormal(normal)
+        plane.SetOrigin(0, 0, 0)
+        self.cutter = vtk.vtkCutter()
+        self.cutter.SetInputData(self.grid)
+        self.cutter.SetCutFunction(plane)
+        self.cutter.GenerateTrianglesOff()
+        for index in range(count):
+            self.cutter.SetValue(index, low + (index + 0.5) * (high - low) / count)
+
+    def run(self, frames):
+        """Number of polygons, and the seconds of each of `frames` cuts after one that is not timed."""
+        self.cutter.Update()
+        seconds = []
+        for _ in range(frames):
+            self.cutter.Modified()
+            start = time.perf_counter()
+            self.cutter.Update()
+            seconds.append(time.perf_counter() - start)
+        return self.cutter.GetOutput().GetNumberOfCells(), seconds
+
+
 class Plane:
     """The plane through the target of a scene's orthographic camera, seen straight, cut by vtkImageReslice."""
 
@@ -134,21 +177,15 @@ class Plane:
         return np.repeat(values[::-1] / 255.0, 3, axis=2), seconds
 
 
-class Scene:
-    """A loaded scene; the reference picture and VTK's converged one come with it."""
+class View:
+    """What a scene says about camera and picture."""
 
-    def __init__(self, file, data_folder, reference_file):
+    def __init__(self, file):
         with open(file, encoding="utf-8") as stream:
             self.described = json.load(stream)
-        source = self.described["input"]
-        self.volume = read_volume(os.path.join(data_folder, source["file"]), source)
-        self.reference = None if reference_file is None else np.load(reference_file).astype(float)
-        self.converged, _ = self.draw("gpu", CONVERGED_STEP_VOXELS, frames=0)
 
-    def draw(self, kind, step_voxels, frames):
+    def shown(self, mapper, frames):
         """The picture as rows of RGB in [0, 1], top row first, and the seconds of each of `frames` further frames."""
-        mapper = mapper_of(kind, step_voxels * min(self.volume.GetSpacing()))
-        mapper.SetInputData(self.volume)
         actor = vtk.vtkVolume()
         actor.SetMapper(mapper)
         actor.SetProperty(look_of(self.described["transfer_function"]))
@@ -190,6 +227,49 @@ class Scene:
         window.Render()
         window.WaitForCompletion()
 
+
+class Grid(View):
+    """A loaded grid as tetrahedra, and its true picture."""
+
+    def __init__(self, file, data_folder, reference_file):
+        super().__init__(file)
+        source = self.described["input"]
+        grid = read_grid(os.path.join(data_folder, source["file"]))
+        grid.GetPointData().SetActiveScalars(source["array"])
+        split = vtk.vtkDataSetTriangleFilter()
+        split.SetInputData(grid)
+        split.TetrahedraOnlyOn()
+        split.Update()
+        self.tetrahedra = split.GetOutput()
+        self.reference = np.load(reference_file).astype(float)
+
+    def draw(self, kind, frames):
+        if kind == "bunyk":
+            mapper = vtk.vtkUnstructuredGridVolumeRayCastMapper()
+            mapper.SetAutoAdjustSampleDistances(False)
+            mapper.SetImageSampleDistance(1)
+        else:
+            mapper = vtk.vtkProjectedTetrahedraMapper()
+        mapper.SetInputData(self.tetrahedra)
+        return self.shown(mapper, frames)
+
+
+class Scene(View):
+    """A loaded scene; the reference picture and VTK's converged one come with it."""
+
+    def __init__(self, file, data_folder, reference_file):
+        super().__init__(file)
+        source = self.described["input"]
+        self.volume = read_volume(os.path.join(data_folder, source["file"]), source)
+        self.reference = None if reference_file is None else np.load(reference_file).astype(float)
+        self.converged, _ = self.draw("gpu", CONVERGED_STEP_VOXELS, frames=0)
+
+    def draw(self, kind, step_voxels, frames):
+        """The picture as rows of RGB in [0, 1], top row first, and the seconds of each of `frames` further frames."""
+        mapper = mapper_of(kind, step_voxels * min(self.volume.GetSpacing()))
+        mapper.SetInputData(self.volume)
+        return self.shown(mapper, frames)
+
     def errors(self, picture):
         truths = {"reference": self.reference, "vtk_converged": self.converged}
         return {name: error(picture, truth) for name, truth in truths.items() if truth is not None}
@@ -221,7 +301,7 @@ def probe():
 
 
 def main():
-    scene = plane = None
+    scene = plane = grid = cut = None
     for line in sys.stdin:
         request = json.loads(line)
         if request["do"] == "probe":
@@ -235,6 +315,18 @@ def main():
         elif request["do"] == "reslice":
             picture, seconds = plane.draw(request["frames"])
             reply = {"seconds": seconds, "errors": {"reference": error(picture, plane.reference)}}
+        elif request["do"] == "load_grid":
+            grid = Grid(request["scene"], request["data"], request["reference"])
+            reply = {"name": grid.described["name"], "cells": grid.tetrahedra.GetNumberOfCells()}
+        elif request["do"] == "draw_grid":
+            picture, seconds = grid.draw(request["mapper"], request["frames"])
+            reply = {"seconds": seconds, "errors": {"reference": error(picture, grid.reference)}}
+        elif request["do"] == "load_cut":
+            cut = Cut(request["file"], request["count"], request["normal"])
+            reply = {"cells": cut.grid.GetNumberOfCells()}
+        elif request["do"] == "cut":
+            polygons, seconds = cut.run(request["frames"])
+            reply = {"seconds": seconds, "polygons": polygons}
         else:
             picture, seconds = scene.draw(request["mapper"], request["step"], request["frames"])
             reply = {"seconds": seconds, "errors": scene.errors(picture)}

@@ -120,3 +120,35 @@ pub(crate) fn scene_json(file: &str) -> serde_json::Value {
 pub(crate) fn head() -> VoxelGrid {
     volery_data::head([72, 90, 90], DVec3::splat(2.5))
 }
+
+/// A file of the generated grid in VTK's legacy format: its values times a factor, some of its cells.
+pub(crate) fn legacy_grid(factor: f64, num_cells: usize) -> String {
+    let grid = volery_data::cylinder(2);
+    let list = |numbers: Vec<String>| numbers.join(" ");
+    let points = list(grid.points().iter().flat_map(|p| p.to_array()).map(|x| x.to_string()).collect());
+    let cells: Vec<_> = grid.cells().iter().take(num_cells).collect();
+    let nodes: usize = cells.iter().map(|(_, nodes)| nodes.len() + 1).sum();
+    let lists = list(
+        cells
+            .iter()
+            .map(|(_, nodes)| format!("{} {}", nodes.len(), list(nodes.iter().map(u32::to_string).collect())))
+            .collect(),
+    );
+    let number = |name: &str| match name {
+        "tetrahedron" => "10",
+        "hexahedron" => "12",
+        "wedge" => "13",
+        _ => "14",
+    };
+    let types = list(cells.iter().map(|(cell_type, _)| number(cell_type.name()).to_owned()).collect());
+    let values = &grid.arrays()[0].values;
+    let values = list((0..values.len()).map(|node| (factor * values.value(node, 0)).to_string()).collect());
+    format!(
+        "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {n} double\n{points}\n\
+         CELLS {cells} {size}\n{lists}\nCELL_TYPES {cells}\n{types}\nPOINT_DATA {n}\nSCALARS heat double\n\
+         LOOKUP_TABLE default\n{values}\n",
+        n = grid.points().len(),
+        cells = cells.len(),
+        size = nodes,
+    )
+}

@@ -5,7 +5,8 @@
 //! field that the bricks were cut from (`oracle::march`), midpoint rule, many steps per cell. The
 //! marcher shares nothing with a backend but the camera's rays and the transfer function. Cutting planes are
 //! compared with a search through all bricks for every pixel (`plane_oracle`); where that picture jumps within a
-//! few thousandths of a pixel either side is right, and such pixels are counted. Cubes are compared with their chords.
+//! few thousandths of a pixel either side is right, and such pixels are counted. Cubes are compared with their chords,
+//! sheets with every ray against every triangle (`sheet_oracle`).
 //! Every check prints its threshold beside the value that it measured.
 //!
 //! # What a backend may do
@@ -31,6 +32,9 @@ mod plane_oracle;
 mod planes;
 mod requests;
 mod sampling;
+mod sheet_oracle;
+mod sheets;
+mod surfaces;
 mod views;
 mod world;
 
@@ -163,6 +167,36 @@ properties! { $
         interpolated_lengths_of_parallel_rays_are_exact
         interpolated_lengths_are_linear_on_the_screen
         rays_in_shared_faces_count_once;
+    sheets:
+        a_constant_sheet_is_a_slab
+        linear_values_are_linear_in_space
+        triangles_share_sides_without_gap_or_overlap
+        stacks_are_their_sums
+        thousands_of_thin_sheets
+        strips_add_and_take_away
+        negative_thickness_is_bounded
+        sheets_of_all_extinctions
+        eyes_inside_stacks
+        far_eyes_and_far_origins
+        magnitudes_choose_rows
+        light_falls_on_both_sides
+        quantized_vertices_are_what_their_numbers_say
+        sheets_that_show_nothing
+        wrong_sheets_are_named
+        revisions_name_contents
+        sheets_and_rays_in_turn;
+    surfaces:
+        surfaces_end_rays
+        surfaces_among_planes
+        surfaces_cut_cubes
+        surfaces_cut_sheets
+        surfaces_around_the_eye
+        balls_have_their_outline
+        surfaces_have_no_gaps
+        the_first_of_equal_surfaces_shows
+        no_surface_changes_nothing
+        surfaces_seen_from_afar
+        a_hundred_thousand_triangles;
 }
 
 #[cfg(test)]
@@ -180,6 +214,8 @@ mod tests {
             include_str!("requests.rs"),
             include_str!("planes.rs"),
             include_str!("cubes.rs"),
+            include_str!("sheets.rs"),
+            include_str!("surfaces.rs"),
         ];
         let written = sources.iter().flat_map(|text| text.lines());
         let written: Vec<_> = written.filter(|line| line.starts_with("pub fn ")).collect();

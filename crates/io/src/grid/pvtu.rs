@@ -15,7 +15,14 @@ pub(super) fn with_parts<R>(
     path: &Path,
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
-    let paths = piece_paths(path)?;
+    with_files(&piece_paths(path)?, run)
+}
+
+/// Opens files of pieces, and runs something on all of them.
+pub(super) fn with_files<R>(
+    paths: &[PathBuf],
+    run: impl FnOnce(&[Part]) -> Result<R, Problem>,
+) -> Result<R, Problem> {
     let of_part = |path: &PathBuf, problem: Problem| problem.of_part(path);
     let files: Vec<FileBytes> = paths
         .iter()

@@ -14,6 +14,10 @@ mod make;
 #[path = "../readers/make_grid.rs"]
 #[allow(dead_code, reason = "the readers' tests use more of it")]
 mod make_grid;
+#[path = "../readers/make_mesh.rs"]
+mod make_mesh;
+#[path = "../readers/make_stack.rs"]
+mod make_stack;
 mod memory;
 mod mutate;
 mod seeds;
@@ -24,7 +28,8 @@ use std::time::{Duration, Instant};
 
 use volery_io::grid::{GridOptions, is_grid, read_array_ranges, read_grid};
 use volery_io::transfer::TransferOptions;
-use volery_io::{Element, ReadOptions, SceneFile, read_transfer, read_volume};
+use volery_io::{Element, ReadOptions, SceneFile};
+use volery_io::{read_mesh, read_stack, read_transfer, read_transfer_2d, read_volume};
 
 use memory::peak_during;
 use mutate::Random;
@@ -42,8 +47,14 @@ fn read_case(path: &Path) -> Result<(), String> {
     let name = path.file_name().unwrap().to_string_lossy().into_owned();
     let line = if name.ends_with("scene.json") {
         SceneFile::read(path).err().map(|error| error.to_string())
+    } else if name.starts_with("mesh") {
+        read_mesh(path, [0.5; 3], MAX_BYTES).err().map(|error| error.to_string())
+    } else if name.starts_with("stack") {
+        read_stack(path, MAX_BYTES).err().map(|error| error.to_string())
     } else if is_grid(path) {
         read_grid_case(path)
+    } else if name.ends_with("2d.json") {
+        read_transfer_2d(path).err().map(|error| error.to_string())
     } else if name.ends_with(".json") {
         let options = TransferOptions { map: None, range: Some([0.0, 9.0]), unit_distance: 1.0 };
         read_transfer(path, &options).err().map(|error| error.to_string())
@@ -152,13 +163,20 @@ families! {
     vti: "a.vti", seeds::vti();
     vtu: "a.vtu", seeds::vtu();
     pvtu: "a.pvtu", seeds::pvtu();
+    pvd: "a.pvd", seeds::pvd();
     legacy_vtk: "a.vtk", seeds::legacy_vtk();
     exodus: "a.ex2", seeds::exodus();
     png: "a.png", seeds::png();
     jpeg: "a.jpg", seeds::jpeg();
     tiff: "a.tif", seeds::tiff();
+    mesh_obj: "mesh.obj", seeds::mesh_obj();
+    mesh_gltf: "mesh.gltf", seeds::mesh_gltf();
+    mesh_glb: "mesh.glb", seeds::mesh_glb();
     scene: "scene.json", seeds::scene();
     transfer: "map.json", seeds::transfer();
+    transfer_2d: "2d.json", seeds::transfer_2d();
+    stack_vsl: "stack.vsl", seeds::stack_vsl();
+    stack_glb: "stack.glb", seeds::stack_glb();
 }
 
 /// Files of a kilobyte that promise up to 60 GiB: refused without allocating for the promise.

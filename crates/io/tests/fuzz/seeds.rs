@@ -4,10 +4,13 @@ use std::io::Cursor;
 
 use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, colortype};
 use volery_io::ByteOrder::{Big, Little};
+use volery_io::{GlbOptions, write_glb};
 use volery_scene::SampleType;
 
 use crate::make::{self, Nifti, VTI_DATA, Vti};
 use crate::make_grid::{self, CELLS, Form, Packing, usual_vtu};
+use crate::make_mesh;
+use crate::make_stack::stack;
 
 fn big() -> Vec<u8> {
     make::payload(SampleType::U16, Big)
@@ -101,6 +104,14 @@ pub(crate) fn pvtu() -> Vec<Vec<u8>> {
     vec![text.to_vec()]
 }
 
+/// Names of steps: one is itself, which is no step, others are not there.
+pub(crate) fn pvd() -> Vec<Vec<u8>> {
+    let text = br#"<VTKFile type="Collection" byte_order="LittleEndian"><Collection>
+        <DataSet timestep="0" group="" part="0" file="a.pvd"/><DataSet timestep="0" part="1" file="b.vtu"/>
+        <DataSet timestep="2.5" file="../nowhere.vtu"/></Collection></VTKFile>"#;
+    vec![text.to_vec()]
+}
+
 pub(crate) fn exodus() -> Vec<Vec<u8>> {
     vec![make_grid::exodus().file()]
 }
@@ -185,6 +196,21 @@ pub(crate) fn tiff() -> Vec<Vec<u8>> {
     files
 }
 
+pub(crate) fn mesh_obj() -> Vec<Vec<u8>> {
+    vec![make_mesh::OBJ.as_bytes().to_vec()]
+}
+
+pub(crate) fn mesh_gltf() -> Vec<Vec<u8>> {
+    let (_, bytes) = make_mesh::gltf("");
+    let uri = format!("\"uri\": \"data:;base64,{}\", ", make::base64(&bytes));
+    vec![make_mesh::gltf(&uri).0.into_bytes()]
+}
+
+pub(crate) fn mesh_glb() -> Vec<Vec<u8>> {
+    let (text, bytes) = make_mesh::gltf("");
+    vec![make_mesh::glb(&text, &bytes)]
+}
+
 pub(crate) fn scene() -> Vec<Vec<u8>> {
     let text = br#"{"name": "tooth", "input": {"kind": "volume", "file": "tooth.raw", "dims": [103, 94, 161],
         "dtype": ">u2", "spacing": [1, 1, 2.5]}, "size": [512, 256], "background": [0, 0.5, 1],
@@ -205,4 +231,27 @@ pub(crate) fn transfer() -> Vec<Vec<u8>> {
         files.push(text.into_bytes());
     }
     files
+}
+
+pub(crate) fn transfer_2d() -> Vec<Vec<u8>> {
+    let palette = r#"{"values": [0, 255], "magnitudes": [0, 40.5], "columns": 2, "rows": 3, "colors": [[0, 0, 1],
+        [1, 0, 0], [0, 1, 1], [1, 1, 0], [0.5, 0.25, 1e-3], [1, 1, 1]], "opacities": [0, 0.1, 0, 0.8, 1, 0.5],
+        "unit_distance": 2.5"#;
+    let sliders = r#", "global_opacity": 0.5, "gradient_weight": 1, "selection": {"mean": 30, "range": 10}"#;
+    ["", sliders].map(|sliders| format!("{palette}{sliders}}}").into_bytes()).to_vec()
+}
+
+pub(crate) fn stack_vsl() -> Vec<Vec<u8>> {
+    [false, true].map(|has_gradients| stack(2, 3, has_gradients).encode()).to_vec()
+}
+
+pub(crate) fn stack_glb() -> Vec<Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stack.glb");
+    let file = |(is_coded, has_gradients)| {
+        let mesh = stack(2, 3, has_gradients).expand();
+        write_glb(&path, &mesh, |_| [0.5; 4], GlbOptions { is_coded }).unwrap();
+        std::fs::read(&path).unwrap()
+    };
+    [(false, false), (true, false), (true, true)].map(file).to_vec()
 }

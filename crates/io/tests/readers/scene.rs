@@ -40,6 +40,16 @@ fn a_grid_an_orthographic_camera_and_a_scene_without_a_name() {
 }
 
 #[test]
+fn meshes_of_a_scene() {
+    assert_eq!(SceneFile::parse(SCENE, "").unwrap().meshes, []);
+    let text =
+        SCENE.replace("\"name\"", "\"meshes\": [{\"file\": \"hull.obj\", \"color\": [0, 0.5, 1]}], \"name\"");
+    let meshes = SceneFile::parse(&text, "").unwrap().meshes;
+    assert_eq!(meshes.len(), 1);
+    assert_eq!((meshes[0].file.to_str(), meshes[0].color), (Some("hull.obj"), [0.0, 0.5, 1.0]));
+}
+
+#[test]
 fn what_a_scene_cannot_be() {
     let cases = [
         ("\"name\"", "\"nmae\"", "unknown field `nmae`, expected one of `name`, `input`"),
@@ -70,6 +80,12 @@ fn what_a_scene_cannot_be() {
         ("[240, -150, 180]", "[51, 46.5, 80]", "camera: eye and target are the same point"),
         ("\"up\": [0, 0, 1]", "\"up\": [0, 0, 0]", "camera: up is parallel"),
         ("[240, -150, 180]", "[1e999, 0, 0]", "number out of range"),
+        ("\"name\"", "\"meshes\": [{\"file\": \"a.obj\"}], \"name\"", "missing field `color`"),
+        (
+            "\"name\"",
+            "\"meshes\": [{\"file\": \"a.obj\", \"color\": [0, 0, 1]}, {\"file\": \"b\", \"color\": [0, 2, 0]}], \"name\"",
+            "meshes[1].color is [0.0, 2.0, 0.0], expected three numbers in [0, 1]",
+        ),
         ("\"opacity\": 0", "\"opacity\": 2", "transfer function: point 0: opacity 2"),
         ("\"points\": [{", "\"points\": [], \"x\": [{", "unknown field `x`"),
     ];

@@ -15,7 +15,7 @@ fn mixed(front: [f64; 3], transmittance: f64) -> [f64; 3] {
 }
 
 /// Outside, near, inside, from a corner, along an axis, through the sample planes; both projections.
-fn cameras(extent: DVec3) -> Vec<(&'static str, Camera)> {
+pub(crate) fn cameras(extent: DVec3) -> Vec<(&'static str, Camera)> {
     let (center, size) = (extent / 2.0, extent.length());
     let oblique = center + DVec3::new(0.7, -1.1, 0.6) * size;
     let along_x = DVec3::new(-size, center.y, center.z);

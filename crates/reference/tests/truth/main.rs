@@ -3,7 +3,10 @@
 //! (`cargo test -- --nocapture`).
 
 mod against_marching;
+mod cells;
 mod closed_forms;
+mod grids;
 mod planes;
 mod requests;
 mod slow;
+mod surfaces;

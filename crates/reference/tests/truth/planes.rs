@@ -36,8 +36,14 @@ fn a_ramp_is_itself_on_any_plane() {
     ];
     for camera in cameras {
         for is_transparent in [false, true] {
-            let scene =
-                PlaneScene { grid: &grid, planes: &planes, transfer: &gray, nearest: false, is_transparent };
+            let scene = PlaneScene {
+                grid: &grid,
+                planes: &planes,
+                transfer: &gray,
+                nearest: false,
+                is_transparent,
+                meshes: &[],
+            };
             let drawn = scene.render(&camera, BACKGROUND, SIZE, &|_| {}).unwrap();
             let mut worst = 0.0_f64;
             each_ray(&camera, |place, ray| {

@@ -133,7 +133,7 @@ pub(crate) fn oracle(grid: &VoxelGrid, transfer: &TransferFunction, ray: &Ray, t
         let value = |t: f64| field_in_cell(grid, cell, at(t));
         if value(ends[0]).is_some() {
             let value = |t: f64| value(t).expect("the cell is not blank");
-            Halving { transfer, value, tolerance }.add_to(&mut light, [ends[0], ends[1]], 0);
+            Integrand { transfer, value, tolerance }.add_to(&mut light, [ends[0], ends[1]], 0);
         }
     }
     light
@@ -143,13 +143,23 @@ fn middle(a: f64, b: f64) -> f64 {
     a / 2.0 + b / 2.0
 }
 
-struct Halving<'a, V> {
-    transfer: &'a TransferFunction,
-    value: V,
-    tolerance: f64,
+/// Matter along a ray, whose value at each distance is known.
+pub(crate) struct Integrand<'a, V> {
+    pub(crate) transfer: &'a TransferFunction,
+    pub(crate) value: V,
+    pub(crate) tolerance: f64,
 }
 
-impl<V: Fn(f64) -> f64> Halving<'_, V> {
+impl<V: Fn(f64) -> f64> Integrand<'_, V> {
+    /// The light of it between the first and the last of some ends, smooth between two of them.
+    pub(crate) fn over(&self, ends: &[f64]) -> Light {
+        let mut light = Light::CLEAR;
+        for pair in ends.windows(2) {
+            self.add_to(&mut light, [pair[0], pair[1]], 0);
+        }
+        light
+    }
+
     fn slice(&self, a: f64, b: f64) -> Light {
         slice(self.transfer, (self.value)(middle(a, b)), b - a)
     }

@@ -119,7 +119,7 @@ fn a_grid_without_cells_has_no_extent_and_no_sections() {
     assert_eq!(slice(&nothing, &planes).num_polygons(), 0);
 }
 
-fn any_parts() -> impl Strategy<Value = Parts> {
+pub(crate) fn any_parts() -> impl Strategy<Value = Parts> {
     // Few places and few nodes, so that nodes coincide, repeat, and lie on planes.
     let coordinate = prop_oneof![4 => (0..4i32).prop_map(f64::from), 1 => -1e3..1e3f64, 1 => any::<f64>()];
     let point = [coordinate.clone(), coordinate.clone(), coordinate].prop_map(DVec3::from_array);

@@ -4,6 +4,11 @@
 
 mod adaptive;
 mod cells;
+mod code;
+mod compact;
+mod gradients;
 mod grids;
 mod hard;
+mod mesh;
+mod steps;
 mod support;

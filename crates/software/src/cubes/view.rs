@@ -8,6 +8,7 @@ use volery_frame::{Frame, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use super::PACKET;
+use crate::surfaces::Surfaces;
 
 /// Steps of rays that all but stand still along an axis are this long, so that their inverse exists.
 const LEAST_STEP: f64 = 1e-30;
@@ -37,6 +38,8 @@ pub(super) struct View {
 pub(super) struct PacketRays {
     pub(super) length_per_step: [[f32; 16]; 3],
     pub(super) at_origin: [[f32; 16]; 3],
+    /// Where the rays end.
+    pub(super) end: [f32; 16],
 }
 
 impl View {
@@ -86,12 +89,14 @@ impl View {
         self.size.map(|n| 0.5 * f64::from(n))
     }
 
-    /// The rays of the packet whose upper left pixel is `(column, row)`. Pixels outside the picture are as good as
-    /// others.
-    pub(super) fn packet(&self, column: u32, row: u32) -> PacketRays {
-        let mut packet = PacketRays { length_per_step: [[0.0; 16]; 3], at_origin: [[0.0; 16]; 3] };
+    /// The rays of the packet whose upper left pixel is `(column, row)`, to where surfaces are. Pixels outside the
+    /// picture are as good as others.
+    pub(super) fn packet(&self, column: u32, row: u32, surfaces: &Surfaces) -> PacketRays {
+        let none = [[0.0; 16]; 3];
+        let mut packet = PacketRays { length_per_step: none, at_origin: none, end: [f32::INFINITY; 16] };
         for lane in 0..16_u32 {
-            let ray = self.rays.pixel(column + lane % PACKET, row + lane / PACKET);
+            let [column, row] = [column + lane % PACKET, row + lane / PACKET];
+            let ray = self.rays.pixel(column, row);
             let origin = ray.origin / self.step;
             let direction = ray.direction / self.step;
             let direction = direction.map(|d| if d.abs() < LEAST_STEP { LEAST_STEP } else { d });
@@ -101,6 +106,7 @@ impl View {
                 // All planes at 0: no cube is met.
                 continue;
             }
+            packet.end[lane as usize] = (surfaces.distance(column, row) / self.unit_length - enter) as f32;
             let entry = origin + enter * direction;
             for axis in 0..3 {
                 packet.length_per_step[axis][lane as usize] = direction[axis].recip() as f32;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use volery_io::grid::{ArrayRange, GridArray, read_array_ranges};
-use volery_io::{GridOptions, ReadError, read_grid};
+use volery_io::{GridFile, GridOptions, ReadError, read_grid};
 use volery_scene::CellType;
 
 use super::number;
@@ -78,9 +78,15 @@ impl GridInfo {
     /// # Errors
     /// When the file cannot be read as a grid.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
-        let options = GridOptions::default();
-        let arrays = read_array_ranges(path, &options)?.into_iter().map(ArrayInfo::from).collect();
-        let file = read_grid(path, &options)?;
+        Self::of(path, read_grid(path, &GridOptions::default())?)
+    }
+
+    /// Looks at every array of a file and every cell of the grid that was read from it.
+    ///
+    /// # Errors
+    /// When an array of the file cannot be read.
+    pub fn of(path: &Path, file: GridFile) -> Result<Self, ReadError> {
+        let arrays = read_array_ranges(path, &GridOptions::default())?.into_iter().map(ArrayInfo::from);
         let grid = &file.grid;
         let cells = CellType::ALL.iter().zip(grid.cells().count_by_type());
         let cells = cells.filter(|(_, count)| *count > 0).map(|(cell_type, count)| (cell_type.name(), count));
@@ -91,7 +97,7 @@ impl GridInfo {
             cells: cells.collect(),
             blank_cells: (0..grid.cells().len()).filter(|&cell| grid.is_blank(cell)).count(),
             bounds: grid.world_bounds().map(|bounds| bounds.map(|corner| corner.to_array())),
-            arrays,
+            arrays: arrays.collect(),
             array: file.array.map(|array| array.name),
             defects: defects(grid),
             notes: file.notes,

@@ -5,7 +5,7 @@ use volery_frame::{DrawError, UploadError};
 use volery_scene::{SampleType, camera, plane};
 
 use super::Focus;
-use crate::technique::residency;
+use crate::technique::{residency, stack};
 
 /// Why a volume cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -111,6 +111,15 @@ pub enum RenderError {
         /// Its name.
         technique: &'static str,
     },
+    /// No planes to slice cells by.
+    #[error("0 slices, expected at least 1")]
+    NoSlice,
+    /// Light, or classification by magnitude, of vertices that have none.
+    #[error("the stack has no gradients, expected some for light and for classification by their magnitude")]
+    NoGradients,
+    /// Cells could not be sliced.
+    #[error(transparent)]
+    Stack(#[from] stack::Error),
     /// No frame was asked for.
     #[error("0 frames, expected at least 1")]
     NoFrame,
@@ -125,6 +134,12 @@ pub enum RenderError {
 /// Why a picture could not be compared with the truth.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
+    /// The picture shows what the reference does not.
+    #[error("reference: knows no {what}, expected a picture without")]
+    Unknown {
+        /// What is shown.
+        what: &'static str,
+    },
     /// The truth could not be computed.
     #[error("reference: {0}")]
     Reference(#[from] volery_reference::Error),

@@ -112,7 +112,8 @@ impl Progressive<'_> {
         let mut uploaded = uploaded;
         uploaded += self.session.upload(plan.nodes())?;
         let image = self.session.draw(&self.view, &plan)?;
-        let times = Times { select, upload, draw: start.elapsed().as_secs_f64() };
+        let draw = start.elapsed().as_secs_f64();
+        let times = Times { select, geometry: None, upload: Some(upload), draw };
         let report = self.session.report(&self.view, &plan, uploaded, &[times]);
         Ok(Step { picture: Picture { image, report }, is_last })
     }

@@ -1,14 +1,17 @@
 //! What to see, and what a user may leave open.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use volery_frame::planes::MAX_PLANES;
 use volery_frame::{Sampling, Thickness};
-use volery_scene::{Camera, Plane, TransferFunction};
+use volery_scene::{Camera, Plane, TransferFunction, TriangleMesh};
 
 use crate::fit;
 use crate::session::RenderError;
+use crate::technique::stack::StackView;
 
-/// What to see of a volume, and how.
+/// What to see of a volume or a grid, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Pixels from left to right.
@@ -19,7 +22,7 @@ pub struct View {
     pub camera: Camera,
     /// Values to colour and extinction; not read for samples that are colours.
     pub transfer: TransferFunction,
-    /// Linear RGB behind the volume.
+    /// Linear RGB behind everything.
     pub background: [f64; 3],
     /// Largest difference of a value from the full resolution, as a fraction of the volume's value range;
     /// `None` does not ask for any.
@@ -28,6 +31,10 @@ pub struct View {
     pub planes: PlaneView,
     /// How the length of a ray in a cube is found; the technique fans alone reads it.
     pub thickness: Thickness,
+    /// How cells are sliced; the technique stack alone reads it.
+    pub stack: StackView,
+    /// Opaque surfaces among the data, in world space: they hide what is behind them.
+    pub meshes: Arc<[TriangleMesh]>,
 }
 
 /// Where a plane is in full detail: a node is coarser the farther it is.
@@ -77,6 +84,8 @@ pub struct ViewOptions {
     pub transfer: Option<TransferFunction>,
     /// Which planes; if there is none, the image itself, or the three in the middle of a volume.
     pub planes: PlaneView,
+    /// How cells are sliced.
+    pub stack: StackView,
 }
 
 impl Default for ViewOptions {
@@ -88,6 +97,7 @@ impl Default for ViewOptions {
             orthographic: false,
             transfer: None,
             planes: PlaneView::default(),
+            stack: StackView::default(),
         }
     }
 }

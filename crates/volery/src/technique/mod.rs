@@ -6,6 +6,7 @@ pub mod parts;
 pub mod plane;
 pub mod raycast;
 pub mod residency;
+pub mod stack;
 
 use volery_scene::VoxelGrid;
 

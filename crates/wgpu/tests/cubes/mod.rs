@@ -4,6 +4,8 @@ use volery_frame::conformance::Property;
 use volery_frame::{Backend, Content, Cube, Cubes, Frame, Image, TexelType, Thickness, VolumeLayout};
 use volery_scene::{Camera, Projection};
 
+use super::difference;
+
 /// What this file checks.
 pub(crate) const ALL: &[Property] = &[
     ("cubes_of_several_buffers_are_drawn_in_order", cubes_of_several_buffers_are_drawn_in_order),
@@ -32,15 +34,6 @@ fn draw(
     let content = Content::Cubes(Cubes { cubes, thickness: Thickness::Exact });
     let frame = Frame { width, height, camera, background: [0.25; 3], meshes: &[], content };
     backend.draw(&frame).expect("cubes need no brick").image
-}
-
-/// The largest difference from what a pixel should be.
-fn difference(image: &Image, expected: impl Fn(usize) -> f64) -> f64 {
-    let differences = image.pixels.iter().enumerate().flat_map(|(place, pixel)| {
-        let expected = expected(place);
-        pixel.map(|part| (f64::from(part) - expected).abs())
-    });
-    differences.fold(0.0, f64::max)
 }
 
 /// 1.1 million cubes, of which each ray meets 103 of other colours.
