@@ -49,7 +49,10 @@ struct Made {
 }
 
 fn print_bytes(made: &[Made]) {
-    println!("| {:<10} | polygons | float | quantised | indexed | drawn, with outline | `.vsl`, with outline |", "grid");
+    println!(
+        "| {:<10} | polygons | float | quantised | indexed | drawn, with outline | `.vsl`, with outline |",
+        "grid"
+    );
     println!("|---|---|---|---|---|---|---|");
     for Made { name, slices, .. } in made {
         let counts = slices.counts;
@@ -65,7 +68,9 @@ fn print_bytes(made: &[Made]) {
             100.0 * slices.compact().encode().len() as f64 / counts.float_bytes as f64,
         );
     }
-    println!("\n| `.vsl` over floats of | polygons | polygons without normals | triangles | triangles and outline |");
+    println!(
+        "\n| `.vsl` over floats of | polygons | polygons without normals | triangles | triangles and outline |"
+    );
     println!("|---|---|---|---|---|");
     for Made { name, num_corners, slices } in made {
         let coded = slices.compact().encode().len() as f64;

@@ -207,7 +207,10 @@ fn slices_from_files_are_drawn_and_described() {
         assert_eq!((&report["input"]["kind"], &report["work"]["slices"]), (&json!("stack"), &json!(200)));
         assert_eq!(report["seconds"].get("geometry"), None);
         let text = shop.done(&format!("info {name}")).stdout;
-        assert!(text.contains("kind      stack of slices, with gradients") && text.contains("slices    200"), "{text}");
+        assert!(
+            text.contains("kind      stack of slices, with gradients") && text.contains("slices    200"),
+            "{text}"
+        );
         let found = volery::io::read_png_rgb(&shop.path(format!("{name}.png"))).unwrap();
         shop.done(&format!("render ring.vtk -o cells.png --slices 200 --axes {view}"));
         let expected = volery::io::read_png_rgb(&shop.path("cells.png")).unwrap();
@@ -217,7 +220,9 @@ fn slices_from_files_are_drawn_and_described() {
         println!("{name}: rmse {rmse} to slices that are not quantised, at most 0.004");
         assert!(rmse < 0.004, "{name}: rmse {rmse}, expected below 0.004");
         shop.done(&format!("render {name} -o shaded.png --shade --size 20x20"));
-        for option in ["--verify", "--slices 4", "--technique raycast", "--tolerance 0.1", "--error-map e.png"] {
+        for option in
+            ["--verify", "--slices 4", "--technique raycast", "--tolerance 0.1", "--error-map e.png"]
+        {
             let words = [name, "stack of slices", option.split(' ').next().unwrap()];
             fails(&shop, &format!("render {name} -o b.png {option}"), 1, &words);
         }

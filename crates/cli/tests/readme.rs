@@ -10,17 +10,30 @@ fn every_command_of_the_readme_works() {
     shop.write_volume("head.nrrd", &head());
     shop.write_scene("scene.json", "waves.nrrd");
     shop.write("wing.vtk", legacy_grid(1.0, usize::MAX));
-    shop.write("wing.pvd", "<VTKFile type=\"Collection\"><Collection><DataSet file=\"wing.vtk\"/></Collection></VTKFile>");
+    shop.write(
+        "wing.pvd",
+        "<VTKFile type=\"Collection\"><Collection><DataSet file=\"wing.vtk\"/></Collection></VTKFile>",
+    );
     let readme = include_str!("../README.md");
     let commands: Vec<_> = readme.lines().filter_map(|line| line.strip_prefix("volery ")).collect();
-    assert_eq!(commands.len(), 7);
+    assert_eq!(commands.len(), 9);
     for command in commands {
         // The demo has a test of its own.
         if !command.starts_with("demo") {
             shop.done(command);
         }
     }
-    for name in ["head.png", "head.exr", "error.png", "report.json", "scene.png", "wing.png", "wing-000.png"] {
+    for name in [
+        "head.png",
+        "head.exr",
+        "error.png",
+        "report.json",
+        "scene.png",
+        "wing.png",
+        "wing-000.png",
+        "wing.glb",
+        "wing.vsl",
+    ] {
         assert!(shop.path(name).is_file(), "{name}");
     }
 }

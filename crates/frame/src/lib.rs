@@ -53,7 +53,10 @@ pub struct Frame<'a> {
     pub camera: Camera,
     /// Linear RGB behind everything.
     pub background: [f32; 3],
-    /// Opaque surfaces among the content: they hide what is behind them, and matter in front veils them.
+    /// Opaque surfaces among the content. The ray of a pixel's centre ends at the nearest, of equals at the first in
+    /// the list; the mesh's colour times [`shade`](volery_scene::mesh::shade) is then what is behind everything. Matter
+    /// and cubes count up to there, planes before it; of a sheet, that part of its slab, half before and half behind the
+    /// triangle along the ray, which is before it. Triangles whose thickness has a slope count whole if they are.
     pub meshes: &'a [TriangleMesh],
     /// What is to be seen.
     pub content: Content<'a>,

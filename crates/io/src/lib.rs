@@ -2,7 +2,7 @@
 //!
 //! [`read_volume`] reads raw, NIfTI-1, NRRD, MetaImage, VTK image data, TIFF, PNG, JPEG and folders of
 //! slices into a [`VoxelGrid`](volery_scene::VoxelGrid); [`read_grid`] reads VTK's XML and legacy unstructured
-//! grids, also in parallel pieces, and Exodus II in netCDF-3 into an
+//! grids, also in parallel pieces and time steps, and Exodus II in netCDF-3 into an
 //! [`UnstructuredGrid`](volery_scene::UnstructuredGrid); [`read_mesh`] reads opaque surfaces; [`SceneFile`] and [`ColorMap`] read what to draw;
 //! [`write_png`], [`write_exr`] and [`write_nrrd`] save, through [`write_atomically`].
 //!

@@ -149,7 +149,8 @@ impl Slicer {
             return Err(Error::TooMany { what: "vertices", found: num_vertices });
         }
         let origin = self.middle();
-        let mut mesh = SliceMesh { normal, origin, ..SliceMesh::default() };
+        let num_polygons = Some(parts.iter().map(|part| part.stack.num_polygons()).sum());
+        let mut mesh = SliceMesh { normal, origin, num_polygons, ..SliceMesh::default() };
         (mesh.edges, mesh.weights) = (Vec::with_capacity(num_vertices), Vec::with_capacity(num_vertices));
         let mut pieces = Vec::new();
         for part in parts {

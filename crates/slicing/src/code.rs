@@ -248,7 +248,11 @@ pub fn check_sheets(sheets: &[MeshSheet], num_triangles: usize) -> Result<(), Er
     let (mut end, mut position) = (0, f64::NEG_INFINITY);
     for sheet in sheets {
         if !(sheet.position >= position && sheet.position.is_finite()) {
-            return Err(wrong("the position of a sheet", format_args!("{:?}", sheet.position), "finite numbers that ascend"));
+            return Err(wrong(
+                "the position of a sheet",
+                format_args!("{:?}", sheet.position),
+                "finite numbers that ascend",
+            ));
         }
         if let Some(part) = sheet.thickness.iter().find(|part| !part.is_finite()) {
             return Err(wrong("the thickness of a sheet", format_args!("{part:?}"), "a finite number"));

@@ -19,6 +19,7 @@
 //! - The same bits on every machine and for any number of threads: f64 with the four operations and the square root.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 use meshoptimizer_rs::{Limits, Workspace, optimize_vertex_cache};
@@ -120,12 +121,7 @@ impl CompactMesh {
         check_numbers(mesh, points.len())?;
         check_counts(values, gradients, points.len())?;
         let planes = planes(mesh);
-        let places = places(mesh, &planes)?;
-        let mut vertices = places.clone();
-        vertices.par_sort_unstable();
-        vertices.dedup();
-        let number = |place: &Place| vertices.partition_point(|other| other < place) as u32;
-        let numbers: Vec<u32> = places.par_iter().with_min_len(RUN).map(number).collect();
+        let (vertices, numbers) = without_twins(&places(mesh, &planes)?);
         let triangles = mesh.triangles.iter().map(|triangle| triangle.map(|vertex| numbers[vertex as usize]));
         let mut compact = Self {
             normal: mesh.normal,
@@ -168,18 +164,22 @@ impl CompactMesh {
             jobs.push(own);
             rest = others;
         }
-        jobs.into_par_iter().for_each_init(
-            || (vec![u32::MAX; num_vertices], workspace()),
-            |(local, workspace), triangles| {
-                let used = number_by_first_use(triangles, local);
-                let corners = triangles.as_flattened_mut();
-                // The order is a matter of bytes and speed alone: where there is none, the one there is stays.
-                if let Ok(ordered) = optimize_vertex_cache(corners, used.len(), workspace) {
-                    corners.copy_from_slice(&ordered);
-                }
-                corners.iter_mut().for_each(|corner| *corner = used[*corner as usize]);
-            },
-        );
+        // What a thread reuses from sheet to sheet.
+        let scratch: Mutex<Vec<(Vec<u32>, Workspace)>> = Mutex::default();
+        jobs.into_par_iter().for_each(|triangles| {
+            let lock = || scratch.lock().unwrap_or_else(PoisonError::into_inner);
+            let kept = lock().pop();
+            let (mut local, mut workspace) =
+                kept.unwrap_or_else(|| (vec![u32::MAX; num_vertices], workspace()));
+            let used = number_by_first_use(triangles, &mut local);
+            let corners = triangles.as_flattened_mut();
+            // The order is a matter of bytes and speed alone: where there is none, the one there is stays.
+            if let Ok(ordered) = optimize_vertex_cache(corners, used.len(), &mut workspace) {
+                corners.copy_from_slice(&ordered);
+            }
+            corners.iter_mut().for_each(|corner| *corner = used[*corner as usize]);
+            lock().push((local, workspace));
+        });
         let mut numbers = vec![u32::MAX; num_vertices];
         let used = number_by_first_use(&mut self.triangles, &mut numbers);
         self.vertices = used.iter().map(|&vertex| self.vertices[vertex as usize]).collect();
@@ -349,6 +349,20 @@ fn places(mesh: &SliceMesh, planes: &[f64]) -> Result<Vec<Place>, Error> {
         }
     };
     mesh.edges.par_iter().zip(&mesh.points).enumerate().with_min_len(RUN).map(place).collect()
+}
+
+/// Every place once, ascending, and the number that each had there.
+fn without_twins(places: &[Place]) -> (Vec<Place>, Vec<u32>) {
+    let mut sorted: Vec<(Place, u32)> = places.iter().copied().zip(0..).collect();
+    sorted.par_sort_unstable();
+    let (mut unique, mut numbers): (Vec<Place>, _) = (Vec::new(), vec![0; places.len()]);
+    for (place, vertex) in sorted {
+        if unique.last() != Some(&place) {
+            unique.push(place);
+        }
+        numbers[vertex as usize] = unique.len() as u32 - 1;
+    }
+    (unique, numbers)
 }
 
 /// Numbers what triangles name by its first use, and returns what has which number; `numbers` is all `u32::MAX`

@@ -3,6 +3,7 @@
 //! ```text
 //! UnstructuredGrid -> Slicer (once) -> Planes -> Stack of Layers, each a Section: vertices on edges, polygons
 //!                                            -> SliceMesh: their triangles, and strips of the outline between
+//!                                            -> CompactMesh, QuantizedMesh: the same in few bytes, to store and send
 //! ```
 //!
 //! # Method

@@ -51,6 +51,8 @@ pub struct SliceMesh {
     pub triangles: Vec<[u32; 3]>,
     /// What the triangles stand for, by ascending position. Together they have every triangle once.
     pub sheets: Vec<MeshSheet>,
+    /// How many polygons the slices were; `None` for a mesh that was read from a file.
+    pub num_polygons: Option<usize>,
 }
 
 /// Triangles at or around one place along the normal that stand for matter of a thickness.

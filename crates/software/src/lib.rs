@@ -23,6 +23,9 @@
 //! Cubes of constant matter are sorted by tile and composited sixteen pixels at a time, see `cubes`: 30 million per
 //! second on those 2 cores, where they are two pixels large.
 //!
+//! Opaque surfaces come first, see `surfaces`: where a pixel's ray meets the nearest, everything else ends for it.
+//! A frame without meshes pays one comparison of depths per brick and packet.
+//!
 //! # Error
 //! A half cell is integrated as if the field were linear over it, a quarter where the cubic bends much: of second
 //! order in the size of a cell, and nothing at all along the axes, where the field is linear. The straight lines

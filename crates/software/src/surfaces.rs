@@ -11,7 +11,7 @@
 //! the first of the nearest stays. So nothing depends on threads.
 //!
 //! # Cost
-//! 20 bytes per pixel and 16 per triangle that may show; nothing where there are no meshes.
+//! 20 bytes per pixel, 16 per triangle that may show and band; nothing where there are no meshes.
 
 use std::ops::RangeInclusive;
 

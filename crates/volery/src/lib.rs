@@ -3,6 +3,8 @@
 //! # Objects
 //! - An [`Input`] is a file with what a scene file says about it; [`read_input`] reads it.
 //! - A [`Backend`] draws: [`open_backend`] takes the best there is.
+//! - A [`GridSession`] holds one grid of cells, ready to be sliced, and the stacks made of it; a [`StackSession`] a stack
+//!   from a file.
 //! - A [`Session`] holds one volume's pyramid and what is resident in a backend. [`Session::open`] costs one
 //!   walk over the samples; after that every picture costs what changed.
 //! - A [`View`] says what to see: size, camera, transfer function, background, and the dial `tolerance`.
@@ -17,7 +19,7 @@
 //! - No input panics. An error is one line that says what was found and what was expected.
 //!
 //! # Non-goals
-//! Lighting and shading; windows and interaction; unstructured grids, which come with their own issue.
+//! Lighting and shading of volumes; windows and interaction.
 
 mod backend;
 pub mod error;

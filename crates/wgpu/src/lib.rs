@@ -31,6 +31,9 @@
 //! sheets, 10 million fragments, in 230 ms; 48 ms of them are the triangles, 120 ms their rasterising and blending.
 //! (`cargo bench -p volery-wgpu`)
 //!
+//! Opaque surfaces have a pass of their own before all else, see `surfaces`; it leaves colours and depths in a texture
+//! at which the others end. Without meshes there is neither the pass nor the reading.
+//!
 //! # Guarantees
 //! No panic: what a device refuses comes back as an error. The same frame gives the same bits on the same
 //! device.

@@ -83,7 +83,7 @@ impl Plane {
         let mut shader_frame = shader_frame(frame, content, pool, &prepared.grid);
         let view = PlaneTiles::new(frame, content.planes, pool.layout());
         let depths_per_length = pool.layout().spacing.max_element().recip();
-        shader_frame.depths_per_length = depths_per_length as f32;
+        shader_frame.depths_per_length = depths_per_length.min(f64::from(f32::MAX)) as f32;
         let shader_tile = |tile: PlaneTile| {
             let offset = (surfaces.zero_depth() - tile.zero_depth) * depths_per_length;
             plane::PlaneTile { surface_offset: offset as f32, ..shader_tile(tile) }

@@ -44,7 +44,8 @@ fn semi_adaptive(slicer: &Slicer) -> Result<(), Box<dyn Error>> {
     let edge = |cell: usize| {
         let (_, nodes) = grid.cells().get(cell);
         let places = nodes.iter().map(|&node| grid.points()[node as usize]);
-        let pairs = nodes.iter().flat_map(|&a| places.clone().map(move |b| grid.points()[a as usize].distance(b)));
+        let pairs =
+            nodes.iter().flat_map(|&a| places.clone().map(move |b| grid.points()[a as usize].distance(b)));
         pairs.filter(|&distance| distance > 0.0).fold(f64::INFINITY, f64::min)
     };
     let smallest = (0..num_cells).map(edge).fold(f64::INFINITY, f64::min);
@@ -52,7 +53,10 @@ fn semi_adaptive(slicer: &Slicer) -> Result<(), Box<dyn Error>> {
     let count = (first.distance() / smallest).floor() as usize + 1;
     let planes = Planes::over(grid, NORMAL, count)?;
     let polygons = slicer.slice(&planes)?.num_polygons();
-    println!("| uniform, below the smallest edge | {:.2e} | {count} | {polygons} | {polygons} | |", planes.distance());
+    println!(
+        "| uniform, below the smallest edge | {:.2e} | {count} | {polygons} | {polygons} | |",
+        planes.distance()
+    );
     Ok(())
 }
 

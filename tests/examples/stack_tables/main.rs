@@ -68,7 +68,9 @@ impl Scene {
 
     fn curves(&mut self) -> Result<(), Box<dyn Error>> {
         println!("\n### {}\n", self.name);
-        println!("| planes | slicing, ms | drawing, ms | both, ms | triangles | rmse | max | rmse of slices alone |");
+        println!(
+            "| planes | slicing, ms | drawing, ms | both, ms | triangles | rmse | max | rmse of slices alone |"
+        );
         println!("|---|---|---|---|---|---|---|---|");
         for count in COUNTS {
             let plain = plain::draw(&self.input, count)?;

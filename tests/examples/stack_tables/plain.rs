@@ -26,9 +26,8 @@ pub(crate) fn draw(input: &Input, count: usize) -> Result<Image, Box<dyn Error>>
     let eye = (scene.camera.eye - mesh.origin).dot(mesh.normal);
     let sheets: Vec<_> = mesh.back_to_front(eye).map(sheet).collect();
     let of_vertices = mesh.points.iter().map(|point| f64::from(point[3]));
-    let range = of_vertices.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-        [low.min(value), high.max(value)]
-    });
+    let range = of_vertices
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
     let content = Content::Sheets(Sheets {
         revision: 0,
         normal: mesh.normal,

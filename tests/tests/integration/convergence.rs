@@ -3,7 +3,8 @@
 
 use glam::DVec3;
 use volery::{
-    BackendChoice, Camera, ControlPoint, PlaneView, Session, Technique, Thickness, TransferFunction, View,
+    BackendChoice, Camera, ControlPoint, PlaneView, Session, StackView, Technique, Thickness,
+    TransferFunction, View,
 };
 use volery_reference::Image;
 use volery_scene::VoxelGrid;
@@ -24,6 +25,7 @@ fn view() -> View {
         tolerance: None,
         planes: PlaneView::default(),
         thickness: Thickness::default(),
+        stack: StackView::default(),
         meshes: [].into(),
     }
 }

@@ -1,7 +1,7 @@
 //! Grids that VTK has drawn too: two programs that share no code, the exact picture, and both backends.
 //!
-//! Thresholds are those of the project: rmse .006 to VTK's march by default, .004 with 1,024 slices and to the exact
-//! picture, .001 between the backends.
+//! The project asks for rmse .006 to VTK's march by default, for .004 with 1,024 slices and to the exact picture. The
+//! thresholds here are what there is: what is left is values that are linear across polygons, whatever their number.
 
 use std::sync::OnceLock;
 
@@ -10,10 +10,9 @@ use volery_io::read_png_rgb;
 use volery_reference::Image;
 use volery_tests::{at_most, backend, data_folder, distance, exact, read_scene, scenes_folder, view_of};
 
-const MAX_RMSE_TO_VTK: f64 = 0.006;
-const MAX_RMSE_TO_VTK_FINE: f64 = 0.004;
-const MAX_RMSE_TO_REFERENCE: f64 = 0.004;
-const MAX_RMSE_BETWEEN_BACKENDS: f64 = 0.001;
+const MAX_RMSE_TO_VTK: f64 = 0.002;
+const MAX_RMSE_TO_REFERENCE: f64 = 0.002;
+const MAX_RMSE_BETWEEN_BACKENDS: f64 = 0.0005;
 
 /// Slices of the fine picture.
 const FINE: usize = 1024;
@@ -72,10 +71,9 @@ impl Scene {
         let data = data_folder(test).expect("asked before");
         let png = read_png_rgb(&scenes_folder(&data).join(format!("{}.vtk.png", self.name))).unwrap();
         let vtk = Image::from_f32(png.width, png.height, &png.pixels).unwrap();
-        let thresholds = [MAX_RMSE_TO_VTK, MAX_RMSE_TO_VTK_FINE];
-        for ((picture, threshold), what) in drawn.iter().zip(thresholds).zip(["by default", "fine"]) {
+        for (picture, what) in drawn.iter().zip(["by default", "fine"]) {
             let found = distance(&format!("{test}, {what}, to VTK"), picture, &vtk);
-            at_most("rmse to VTK", found.rmse, threshold);
+            at_most("rmse to VTK", found.rmse, MAX_RMSE_TO_VTK);
         }
     }
 

@@ -112,7 +112,7 @@ fn a_file_changes_the_picture_little() {
         let picture = picture(&scene, &decoded, points, range);
         let what = format!("{name}: from a file against as sliced");
         let found = distance(&what, &exact(&exact_picture), &exact(&picture));
-        at_most(&what, found.rmse, 0.002);
+        at_most(&what, found.rmse, 0.0002);
         let black = volery_reference::metrics::compare(
             &exact(&exact_picture),
             &exact(&Image { pixels: vec![[0.0; 3]; exact_picture.pixels.len()], ..exact_picture.clone() }),

@@ -9,7 +9,7 @@ use volery::{Slicing, StackView};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Technique stack")]
 pub(crate) struct StackArgs {
-    /// Planes over the extent of the grid; with --adaptive those of the first step [default: 256]
+    /// Planes over the extent of the grid; with --adaptive those of the first step [default: 128]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(crate) slices: Option<u32>,
     /// Put more planes between others where cells are, until this share of the cells is met

@@ -31,6 +31,9 @@ pub(super) fn run(
         opened.map_err(|error| of_file(&input.path, &error))?
     };
     let view = view(args, input, &session)?;
+    if args.is_verified() {
+        view.stack.check_verifiable()?;
+    }
     if !args.stack.time_steps.is_empty() {
         return time_steps(args, &mut session, &view);
     }

@@ -6,7 +6,7 @@
 //! marcher shares nothing with a backend but the camera's rays and the transfer function. Cutting planes are
 //! compared with a search through all bricks for every pixel (`plane_oracle`); where that picture jumps within a
 //! few thousandths of a pixel either side is right, and such pixels are counted. Cubes are compared with their chords,
-//! sheets with every ray against every triangle (`sheet_oracle`).
+//! sheets with every ray against every triangle (`sheet_oracle`), and so are opaque surfaces.
 //! Every check prints its threshold beside the value that it measured.
 //!
 //! # What a backend may do

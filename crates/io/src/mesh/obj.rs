@@ -64,7 +64,7 @@ fn problem(error: LoadError, counts: &Counts, last: &str) -> Problem {
             Problem::field(
                 "a corner of a face",
                 "a point that does not exist",
-                format!("1 to {points} or -{points} to -1"),
+                format!("one of the {points} of the file"),
             )
         }
         LoadError::PositionParseError | LoadError::ScalingByZeroError => {

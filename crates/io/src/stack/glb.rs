@@ -11,7 +11,7 @@
 //! Mesh `slices` has a primitive per slice. Mesh `outline` has the strips between them, which take matter away as well
 //! and mean nothing to a viewer; no node shows it. The `extras` of a primitive are `position` and `thickness` of its
 //! sheet; those of the file, under `volery`, are `normal`, `origin`, `low`, `scale` and `magnitude_scale`, as the fields
-//! of [`QuantizedMesh`] have them.
+//! of `QuantizedMesh` have them.
 //!
 //! With [`GlbOptions::is_coded`] both views are compressed as EXT_meshopt_compression says, to about a quarter; then
 //! a viewer must know that too.

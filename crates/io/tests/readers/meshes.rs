@@ -133,7 +133,10 @@ fn what_an_obj_file_cannot_be() {
     let folder = Folder::new();
     let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\n";
     for (text, expected) in [
-        (format!("{square}f 1 2 4\n"), "a corner of a face is a point that does not exist, expected 1 to 3"),
+        (
+            format!("{square}f 1 2 4\n"),
+            "a corner of a face is a point that does not exist, expected one of the 3 of the file",
+        ),
         (format!("{square}f 1 2 0\n"), "a corner of a face is a point that does not exist"),
         (format!("{square}f 1 2 -4\n"), "a corner of a face is a point that does not exist"),
         (format!("{square}f 1 2 9223372036854775807\n"), "a corner of a face is a point that does not exist"),

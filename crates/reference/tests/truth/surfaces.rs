@@ -35,7 +35,7 @@ fn meshes() -> [TriangleMesh; 2] {
             points.extend((0..3).map(|_| center + (DVec3::new(next(), next(), next()) - 0.5) * size));
         }
         let triangles = (0..60).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        TriangleMesh::new(points, triangles, color).unwrap()
+        TriangleMesh::new(points, triangles, color).expect("corners are numbers of points")
     })
 }
 

@@ -20,8 +20,11 @@ fn step(grid: &UnstructuredGrid, seed: u64) -> (Samples, Vec<DVec3>) {
     (values.into(), grid.points().iter().map(|_| random.vector()).collect())
 }
 
+/// Points, gradients, triangles and sheets.
+type Bits = ([Vec<[u32; 4]>; 2], Vec<[u32; 3]>, String);
+
 /// All there is, as bits.
-fn bits(mesh: &SliceMesh) -> ([Vec<[u32; 4]>; 2], Vec<[u32; 3]>, String) {
+fn bits(mesh: &SliceMesh) -> Bits {
     let of = |vectors: &[[f32; 4]]| vectors.iter().map(|vector| vector.map(f32::to_bits)).collect();
     ([of(&mesh.points), of(&mesh.gradients)], mesh.triangles.clone(), format!("{:?}", mesh.sheets))
 }

@@ -66,7 +66,10 @@ impl StackView {
     }
 
     /// Whether the reference knows what such pictures show.
-    pub(crate) fn check_verifiable(&self) -> Result<(), VerifyError> {
+    ///
+    /// # Errors
+    /// When they show light or gradient magnitudes.
+    pub fn check_verifiable(&self) -> Result<(), VerifyError> {
         let what = if self.classification.is_some() { "gradient magnitudes" } else { "light" };
         if self.needs_gradients() { Err(VerifyError::Unknown { what }) } else { Ok(()) }
     }
@@ -88,7 +91,7 @@ impl Default for StackView {
     fn default() -> Self {
         Self {
             slicing: Slicing::default(),
-            num_slices: 256,
+            num_slices: 128,
             adaptive: None,
             classification: None,
             is_lit: false,
@@ -323,6 +326,7 @@ pub(crate) struct Frames {
     bytes_uploaded: u64,
     slices: usize,
     triangles: usize,
+    polygons: Option<usize>,
 }
 
 impl Frames {
@@ -345,6 +349,7 @@ impl Frames {
         self.times.push(Times { select, geometry, upload: None, draw });
         self.bytes_uploaded += bytes;
         (self.slices, self.triangles) = (stack.num_slices(), stack.mesh.triangles.len());
+        self.polygons = stack.mesh.num_polygons;
         self.last = Some(image);
         Ok(())
     }
@@ -372,7 +377,7 @@ impl Frames {
                 bricks: None,
                 bytes_resident,
                 bytes_uploaded: self.bytes_uploaded,
-                polygons: None,
+                polygons: self.polygons,
                 slices: Some(self.slices),
                 triangles: Some(self.triangles),
             },

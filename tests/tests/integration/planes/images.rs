@@ -101,7 +101,7 @@ fn a_focus_in_an_image_leaves_no_seam() {
             largest = largest.max(steepest(&draw(&mut session, &view).image));
         }
         view.camera = session.view(&ViewOptions::default()).camera;
-        let levels = draw(&mut session, &view).report.work.nodes_by_level.as_ref().unwrap();
+        let levels = draw(&mut session, &view).report.work.nodes_by_level.unwrap();
         assert!(levels.len() > 3, "nodes by level: {levels:?}");
         largest
     };
