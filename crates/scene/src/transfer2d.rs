@@ -11,7 +11,7 @@
 //!
 //! The paper names the sliders and not their formulas; these are ours. The selection is soft, so that it can be drawn
 //! from a table: a half at both ends of its range, with a smooth step over a quarter of the range around each, so that
-//! what counts adds up to the range. As in [`TransferFunction`](crate::TransferFunction) an opacity is per
+//! what counts adds up to the range. As in [`TransferFunction`] an opacity is per
 //! `unit_distance` of matter, and extinction follows as `s = -ln(1 - opacity) / unit_distance`.
 //!
 //! Clones share the palette until one of them edits it, so a [`History`](crate::History) of moved sliders costs little.
