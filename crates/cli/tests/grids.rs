@@ -32,7 +32,7 @@ fn a_grid_is_drawn_and_reported() {
         report["input"]["cells"],
         json!({"hexahedron": 32, "pyramid": 16, "tetrahedron": 160, "wedge": 64})
     );
-    assert_eq!((&report["input"]["scalar"], &report["work"]["slices"]), (&json!("f64"), &json!(256)));
+    assert_eq!((&report["input"]["scalar"], &report["work"]["slices"]), (&json!("f64"), &json!(128)));
     for missing in ["dims", "nodes", "upload", "bricks"] {
         assert!(!report.to_string().contains(&format!("\"{missing}\"")), "{missing} does not apply");
     }
@@ -53,7 +53,7 @@ fn options_of_stacks_change_the_picture_as_they_say() {
         )
     };
     let default = picture("default", "");
-    assert_eq!(default, picture("same", "--technique stack --slices 256 --array heat"));
+    assert_eq!(default, picture("same", "--technique stack --slices 128 --array heat"));
     assert_eq!(picture("few", "--slices 20").1, 20);
     let axes = picture("axes", "--axes");
     assert!(axes.0 != default.0, "other planes, other bits");
