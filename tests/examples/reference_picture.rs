@@ -8,8 +8,8 @@ use std::fs;
 use std::path::Path;
 
 use volery::glam::DVec3;
-use volery::{Plane, View};
-use volery_reference::PlaneScene;
+use volery::{InputData, Plane, View};
+use volery_reference::{GridTracer, PlaneScene};
 use volery_tests::view_of;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -21,13 +21,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let input = volery::read_input(Path::new(scene), Some(Path::new(data)))?;
     let view = view_of(&input);
-    let grid = &input.volume()?.grid;
     let (width, height) = (view.width, view.height);
     let View { camera, transfer, background, .. } = &view;
-    let truth = match plane {
-        None => volery_reference::render(grid, camera, transfer, *background, width, height)?,
-        Some(plane) => {
-            let planes = &[plane];
+    let truth = match (&input.data, plane) {
+        (InputData::Grid(file), None) => {
+            let array = file.array.as_ref().ok_or("a grid without an array")?;
+            let array = file.grid.array(&array.name).ok_or("the grid lacks its array")?;
+            let tracer = GridTracer::new(&file.grid, &array.values, transfer)?;
+            tracer.render(camera, *background, width, height, &|_| {})?
+        }
+        (_, None) => {
+            let grid = &input.volume()?.grid;
+            volery_reference::render(grid, camera, transfer, *background, width, height)?
+        }
+        (_, Some(plane)) => {
+            let (grid, planes) = (&input.volume()?.grid, &[plane]);
             let scene =
                 PlaneScene { grid, planes, transfer, nearest: false, is_transparent: false, meshes: &[] };
             scene.render(camera, *background, [width, height], &|_| {})?

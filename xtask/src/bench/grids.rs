@@ -18,17 +18,21 @@ use super::vtk::Vtk;
 const MAPPERS: [(&str, &str); 2] = [("bunyk", BUNYK.0), ("tetrahedra", "VTK projected tetrahedra")];
 
 /// What Volery draws with: the setting for people, and the options of the program.
-const SETTINGS: [(&str, &[&str]); 10] = [
+type Setting = (&'static str, &'static [&'static str]);
+
+const EVEN: [Setting; 6] = [
     ("32 slices", &["--slices", "32"]),
     ("64 slices", &["--slices", "64"]),
     ("128 slices", &["--slices", "128"]),
     ("256 slices", &["--slices", "256"]),
     ("512 slices", &["--slices", "512"]),
     ("1024 slices", &["--slices", "1024"]),
-    ("16 slices and finer for small cells", &["--slices", "16", "--adaptive", "1"]),
-    ("32 slices and finer for small cells", &["--slices", "32", "--adaptive", "1"]),
-    ("64 slices and finer for small cells", &["--slices", "64", "--adaptive", "1"]),
-    ("128 slices and finer for small cells", &["--slices", "128", "--adaptive", "1"]),
+];
+
+const SEMI_ADAPTIVE: [Setting; 3] = [
+    ("16 slices, finer for thin cells", &["--slices", "16", "--adaptive", "1"]),
+    ("64 slices, finer for thin cells", &["--slices", "64", "--adaptive", "1"]),
+    ("128 slices, finer for thin cells", &["--slices", "128", "--adaptive", "1"]),
 ];
 
 /// Control points between two of the scene, for VTK's meaning of opacity.
@@ -67,7 +71,9 @@ pub(super) fn measure(
     let reference = volery.write_reference(&in_vtk_meaning(&scene, folder)?, data, None)?;
     vtk.load_grid(&scene, data, &reference)?;
     let mut of_vtk = MAPPERS.map(|(_, program)| Row::new(name, program, BUNYK.1));
-    let programs = BACKENDS.iter().flat_map(|backend| SETTINGS.map(|setting| (*backend, setting)));
+    let programs = BACKENDS
+        .iter()
+        .flat_map(|backend| EVEN.iter().chain(&SEMI_ADAPTIVE).map(move |setting| (*backend, *setting)));
     let mut of_volery: Vec<_> = programs
         .map(|(backend, setting)| {
             let row = Row::new(name, &format!("Volery {backend}"), setting.0);
