@@ -15,7 +15,7 @@ use crate::sheet::{Tile, contact_sheet};
 use crate::{Failure, say};
 
 /// Width and height of a picture.
-const SIDE: u32 = 272;
+const SIDE: u32 = 248;
 
 /// Pictures in a row of the contact sheet: those of one scene.
 const COLUMNS: u32 = 7;
