@@ -47,6 +47,19 @@ impl Default for Direction {
     }
 }
 
+impl Direction {
+    /// Straight at planes of this unit normal, from the side of them that is nearer to the default.
+    pub fn facing(normal: DVec3) -> Self {
+        let usual = Self::default();
+        let (azimuth, elevation) = (usual.azimuth_deg.to_radians(), usual.elevation_deg.to_radians());
+        let to_eye =
+            DVec3::new(elevation.cos() * azimuth.sin(), -elevation.cos() * azimuth.cos(), elevation.sin());
+        let side = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+        let azimuth_deg = side.x.atan2(-side.y).to_degrees();
+        Self { azimuth_deg, elevation_deg: side.z.clamp(-1.0, 1.0).asin().to_degrees(), zoom: 1.0 }
+    }
+}
+
 /// Boxes in world units, `[low, high]`, that hold the visible matter; the whole domain if nothing is visible.
 pub fn visible_blocks(pyramid: &Pyramid, transfer: &TransferFunction) -> Vec<[DVec3; 2]> {
     let layout = pyramid.layout();
@@ -201,6 +214,19 @@ mod tests {
             largest = largest.max(p.dot(up).abs() / half).max(p.dot(right).abs() / (half * aspect));
         }
         largest
+    }
+
+    #[test]
+    fn a_direction_faces_planes_of_any_normal() {
+        let bounds = [DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)];
+        for normal in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::Z, DVec3::NEG_Z, DVec3::new(0.3, -0.5, 0.81)]
+        {
+            let normal = normal.normalize();
+            let [_, _, forward] = camera(&[bounds], Direction::facing(normal), true, 1.0).axes();
+            assert!(normal.dot(forward).abs() > 1.0 - 1e-12, "{normal}: {forward}");
+            let [_, _, usual] = camera(&[bounds], Direction::default(), true, 1.0).axes();
+            assert!(usual.dot(forward) > 0.0, "{normal}: {forward}");
+        }
     }
 
     #[test]

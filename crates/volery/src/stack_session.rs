@@ -7,6 +7,7 @@ use volery_frame::Backend;
 use volery_scene::{Samples, TransferFunction};
 use volery_slicing::QuantizedMesh;
 
+use crate::fit::Direction;
 use crate::histogram::Histogram;
 use crate::report;
 use crate::session::{Picture, RenderError, View, ViewOptions};
@@ -65,9 +66,12 @@ impl StackSession {
         self.stack.has_gradients()
     }
 
-    /// A view of all of it; see [`GridSession::view`](crate::GridSession::view).
+    /// A view of all of it, straight at its slices where the options have no direction: seen from the side, slices
+    /// are lines. Else as [`GridSession::view`](crate::GridSession::view).
     pub fn view(&self, options: &ViewOptions) -> View {
-        stack::view(self.world_bounds, options, || self.preset(Preset::Auto))
+        let direction = options.direction.unwrap_or_else(|| Direction::facing(self.stack.normal()));
+        let options = ViewOptions { direction: Some(direction), ..options.clone() };
+        stack::view(self.world_bounds, &options, || self.preset(Preset::Auto))
     }
 
     /// The transfer function of a preset, from the values at the vertices.

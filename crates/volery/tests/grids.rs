@@ -304,6 +304,8 @@ fn few_bits_are_nearly_as_good_and_slices_from_a_file_show_the_same() {
     let mut stack = StackSession::open(file, software()).unwrap();
     let found = stack.render_frames(&exact, 2).unwrap();
     assert!(bits(&found.image) == bits(&b.image));
+    let [_, _, facing] = stack.view(&ViewOptions::default()).camera.axes();
+    assert!(facing.dot(forward).abs() > 1.0 - 1e-6, "{facing}, expected along {forward}");
     assert_eq!((found.report.input.kind, found.report.frames.len()), ("stack", 2));
     let lit = View { stack: StackView { is_lit: true, ..exact.stack.clone() }, ..exact.clone() };
     assert!(matches!(stack.render_frames(&lit, 1), Err(RenderError::NoGradients)));

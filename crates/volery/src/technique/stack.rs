@@ -195,6 +195,10 @@ impl Stack {
         self.mesh.origin
     }
 
+    pub(crate) fn normal(&self) -> DVec3 {
+        self.mesh.normal
+    }
+
     pub(crate) fn has_gradients(&self) -> bool {
         !self.mesh.gradients.is_empty()
     }
