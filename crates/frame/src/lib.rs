@@ -10,9 +10,9 @@
 //! continuous across bricks of one level without looking at a neighbour. A backend casts a ray per pixel
 //! through the bricks front to back. Inside a brick it walks the cells between samples: along a ray the
 //! field in one cell is a cubic without kinks, so splitting at cell faces removes the error of the field's
-//! curvature that keeps fixed steps at first order. Each piece is integrated through an
-//! [`IntegratedTransfer`], the antiderivative of extinction and of colour times extinction, which sees
-//! every control point between the ends of a piece, however steep the field.
+//! curvature that keeps fixed steps at first order. Each piece is integrated through a [`RayTransfer`]: in most cells
+//! by the antiderivative of extinction and of colour times extinction, which sees every control point between the ends
+//! of a piece, however steep the field; where that might be wrong, from control point to control point.
 //!
 //! # Guarantees
 //! A picture depends on the frame alone: not on the number of threads, nor on the order of uploads.
@@ -26,18 +26,18 @@ pub mod brick_grid;
 #[cfg(feature = "conformance")]
 pub mod conformance;
 pub mod cubes;
-pub mod integral;
 pub mod plane_tiles;
 pub mod planes;
+pub mod ray_transfer;
 pub mod sheets;
 
 pub use backend::{Backend, Device, DeviceKind, DrawError, Drawn, Image, UploadError};
 pub use brick::{Brick, BrickId, PlacedBrick, TexelType, Texels, VolumeLayout};
 pub use brick_grid::BrickGrid;
 pub use cubes::{Cube, Cubes, Thickness};
-pub use integral::IntegratedTransfer;
 pub use plane_tiles::{PlaneTile, PlaneTiles};
 pub use planes::{BlendedBrick, Planes, PointTransfer, Sampling};
+pub use ray_transfer::RayTransfer;
 pub use sheets::{Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets};
 
 use volery_scene::{Camera, TriangleMesh};
@@ -90,8 +90,8 @@ impl Content<'_> {
 /// Emitting and absorbing matter, integrated along one ray per pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<'a> {
-    /// Colour and extinction, made for the layout's value range.
-    pub transfer: &'a IntegratedTransfer,
+    /// Colour and extinction, made for the layout.
+    pub transfer: &'a RayTransfer,
     /// What to draw, front to back: no brick hides one that comes before it. Bricks do not overlap; what
     /// no brick covers is empty.
     pub bricks: &'a [PlacedBrick],

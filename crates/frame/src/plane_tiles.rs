@@ -206,7 +206,7 @@ fn narrow(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Content, IntegratedTransfer, Rays, TexelType};
+    use crate::{Content, RayTransfer, Rays, TexelType};
     use volery_scene::{Camera, ControlPoint, TransferFunction};
 
     /// What f32 makes of a tile at one of its pixels: the place from the volume's corner, and the depth.
@@ -256,7 +256,7 @@ mod tests {
         let (mut worst, mut worst_cells, mut num) = (0.0_f64, 0.0_f64, 0);
         let point = ControlPoint { value: 0.0, color: [0.0; 3], opacity: 0.0 };
         let transfer = TransferFunction::new(vec![point], 1.0).unwrap();
-        let transfer = IntegratedTransfer::new(&transfer, [0.0, 1.0], 1.0);
+        let transfer = RayTransfer::new(&transfer, &layout(511, DVec3::ONE));
         for spacing in [DVec3::ONE, DVec3::new(1.0, 1.0, 10.0), DVec3::splat(1e-9)] {
             let layout = layout(511, spacing);
             let extent = spacing * 511.0;
@@ -319,7 +319,7 @@ mod tests {
                 let view = Camera::fitted(DVec3::splat(extent.max(1.0)), 30.0, 20.0, 1.0, true);
                 let point = ControlPoint { value: 0.0, color: [0.0; 3], opacity: 0.0 };
                 let transfer = TransferFunction::new(vec![point], 1.0).unwrap();
-                let transfer = IntegratedTransfer::new(&transfer, [0.0, 1.0], 1.0);
+                let transfer = RayTransfer::new(&transfer, &layout);
                 let content = Content::Rays(Rays { transfer: &transfer, bricks: &[] });
                 let frame =
                     Frame { width: 16, height: 16, camera: view, background: [0.0; 3], meshes: &[], content };

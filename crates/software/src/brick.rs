@@ -1,13 +1,14 @@
 //! A brick as the executor keeps it: samples, and the range of every block of cells.
 
-use volery_frame::{Brick, IntegratedTransfer, UploadError, VolumeLayout};
+use volery_frame::ray_transfer::BinSet;
+use volery_frame::{Brick, RayTransfer, UploadError, VolumeLayout};
 
 use crate::texel::Texel;
 
 /// Blocks of a brick per axis, at most: one bit each fills a SIMD register of 512 bits.
 const BLOCKS: u32 = 8;
 
-/// Which blocks of a brick may hold matter: bit `x` of byte `y + 8 z`.
+/// Some blocks of a brick: bit `x` of byte `y + 8 z`.
 pub(crate) type Occupancy = [u8; 64];
 
 /// Cells of a block per axis, for bricks of `brick_cells`: a power of two.
@@ -66,25 +67,22 @@ impl<T: Texel> StoredBrick<T> {
         (size_of::<Self>() + size_of_val::<[T]>(texels) + size_of_val::<[[T; 2]]>(ranges)) as u64
     }
 
-    /// Marks the blocks that may hold matter; `None` when there is none.
-    pub(crate) fn occupancy(
-        &self,
-        transfer: &IntegratedTransfer,
-        bin_from_texel: [f32; 2],
-    ) -> Option<Occupancy> {
-        let [scale, offset] = bin_from_texel;
-        let mut occupancy = [0; 64];
+    /// Marks the blocks whose texels meet a set of bins; `None` when there is none.
+    pub(crate) fn blocks(&self, transfer: &RayTransfer, bins: &BinSet) -> Option<Occupancy> {
+        if bins.is_empty() {
+            return None;
+        }
+        let mut marks = [0; 64];
         let [nx, ny, _] = self.blocks;
         for (i, [low, high]) in (0_u32..).zip(&self.ranges) {
-            // A negative scale turns the range around.
-            let (a, b) = (low.to_f32() * scale + offset, high.to_f32() * scale + offset);
+            let [first, last] = transfer.bins_of(low.to_f32(), high.to_f32());
             // Bins are rounded to nearest when a ray is classified, hence the half bin on either side.
-            if low <= high && !transfer.is_transparent(a.min(b) - 0.5, a.max(b) + 0.5) {
+            if low <= high && bins.meets(first - 0.5, last + 0.5) {
                 let [x, y, z] = [i % nx, i / nx % ny, i / nx / ny];
-                occupancy[(y + BLOCKS * z) as usize] |= 1 << x;
+                marks[(y + BLOCKS * z) as usize] |= 1 << x;
             }
         }
-        (occupancy != [0; 64]).then_some(occupancy)
+        (marks != [0; 64]).then_some(marks)
     }
 }
 

@@ -40,6 +40,7 @@
 
 mod brick;
 mod cubes;
+mod exact;
 mod math;
 mod packet;
 mod plane;

@@ -3,31 +3,29 @@
 use fearless_simd::{Level, dispatch, mask32x16, prelude::*};
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_frame::{DrawError, Frame, IntegratedTransfer, PlacedBrick, Rays, VolumeLayout};
+use volery_frame::ray_transfer::BinSet;
+use volery_frame::{DrawError, Frame, RayTransfer, PlacedBrick, Rays, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::{Occupancy, StoredBrick, block_cells};
+use crate::exact::Bands;
 use crate::packet::{PACKET, Packet};
 use crate::pool::Bricks;
 use crate::surfaces::Surfaces;
 use crate::texel::Texel;
-use crate::walk::{Light, MIN_PAIR_BINS, Matter, Table, walk};
+use crate::walk::{Light, Matter, Table, walk};
 
 /// Pixels of a tile per axis, a multiple of [`PACKET`].
 pub(crate) const TILE: u32 = 32;
-
-/// A cell is integrated in four pieces instead of two where the field bends by more than this share of the value
-/// range. Measured on heptane, 512x512: rmse 3.9e-4 without, 1.4e-4 at 0.1, 0.8e-4 at 0.05, each in the same time.
-const MAX_BEND: f32 = 0.05;
 
 /// A brick of this frame that holds matter.
 struct Drawable<'a, T> {
     brick: &'a StoredBrick<T>,
     occupancy: Occupancy,
+    /// Blocks that are too much for the table.
+    exact: Option<Occupancy>,
     level: u32,
-    /// Whether a cell may hold more optical depth than a pair of pieces takes, or the table has restarts.
-    needs_care: bool,
     /// Lower and upper corner in finest cells.
     bounds: [[f64; 3]; 2],
     /// First and last tile along x and y that its picture touches.
@@ -55,8 +53,6 @@ pub(crate) fn draw<T: Texel>(
     bricks: &Bricks<T>,
 ) -> Result<Vec<[f32; 3]>, DrawError> {
     let Rays { transfer, bricks: placed_bricks } = *content;
-    let [scale, offset] = transfer.bin_from_value();
-    let bin_from_texel = [(scale * layout.value_scale) as f32, (scale * layout.value_offset + offset) as f32];
     let projector = Projector::new(frame, layout);
     let stored: Vec<_> = placed_bricks
         .iter()
@@ -64,17 +60,19 @@ pub(crate) fn draw<T: Texel>(
             bricks.get(&placed.id).ok_or(DrawError::NotResident { id: placed.id }).map(|b| (placed, b))
         })
         .collect::<Result<_, _>>()?;
+    let exact: Vec<_> = (0..=placed_bricks.iter().map(|placed| placed.level).max().unwrap_or(0))
+        .map(|level| transfer.exact_bins(layout, level))
+        .collect();
     let drawables = stored
         .into_par_iter()
-        .filter_map(|(placed, brick)| drawable(transfer, layout, &projector, bin_from_texel, placed, brick))
+        .filter_map(|(placed, brick)| drawable(transfer, &exact, layout, &projector, placed, brick))
         .collect();
-    let texels_per_bin = bin_from_texel[0].abs().recip();
     let table = Table {
         entries: transfer.entries(),
-        bin_from_texel,
-        max_bend: MAX_BEND * transfer.num_bins() as f32 * texels_per_bin,
-        min_pair: MIN_PAIR_BINS * texels_per_bin,
-        restarts: transfer.restarts(),
+        texel_origin: transfer.texel_origin() as f32,
+        bin_from_texel: transfer.bin_from_texel().map(|x| x as f32),
+        slope: transfer.slope() as f32,
+        bands: Bands { bands: transfer.bands(), depth_scale: transfer.depth_scale() as f32 },
     };
     let rays = frame.camera.rays(frame.width, frame.height);
     let shared = Shared { layout, unit_length: transfer.unit_length(), rays, surfaces, table, drawables };
@@ -102,10 +100,10 @@ pub(crate) fn assembled(frame: &Frame<'_>, tiles: &[Vec<[f32; 3]>]) -> Vec<[f32;
 }
 
 fn drawable<'a, T: Texel>(
-    transfer: &IntegratedTransfer,
+    transfer: &RayTransfer,
+    exact: &[BinSet],
     layout: &VolumeLayout,
     projector: &Projector,
-    bin_from_texel: [f32; 2],
     placed: &PlacedBrick,
     brick: &'a StoredBrick<T>,
 ) -> Option<Drawable<'a, T>> {
@@ -115,9 +113,9 @@ fn drawable<'a, T: Texel>(
     let high = std::array::from_fn(|axis| f64::from(high[axis].min(held(axis))));
     let bounds = [low.map(f64::from), high];
     let tiles = projector.tiles(bounds)?;
-    let occupancy = brick.occupancy(transfer, bin_from_texel)?;
-    let needs_care = transfer.is_dense(layout, placed.level) || !transfer.restarts().is_empty();
-    Some(Drawable { brick, occupancy, level: placed.level, needs_care, bounds, tiles })
+    let occupancy = brick.blocks(transfer, transfer.visible_bins())?;
+    let exact = brick.blocks(transfer, &exact[placed.level as usize]);
+    Some(Drawable { brick, occupancy, exact, level: placed.level, bounds, tiles })
 }
 
 /// Finds the tiles that a box can touch.
@@ -243,17 +241,12 @@ fn draw_packet<S: Simd, T: Texel>(
             samples: drawable.brick.samples,
             texels: &drawable.brick.texels,
             occupancy: &drawable.occupancy,
+            exact: drawable.exact.as_ref(),
             block: block_cells(shared.layout.brick_cells),
         };
         simd.vectorize(
             #[inline(always)]
-            || {
-                if drawable.needs_care {
-                    walk::<_, _, true>(simd, &span, &matter, shared.table, &mut light);
-                } else {
-                    walk::<_, _, false>(simd, &span, &matter, shared.table, &mut light);
-                }
-            },
+            || walk(simd, &span, &matter, shared.table, &mut light),
         );
         wanted = light.transmittance.simd_gt(MIN_TRANSMITTANCE);
         if wanted.all_false() {

@@ -4,29 +4,22 @@
 //! that is still on its way stands in a block with matter; then all take one cell. In a cell the field along
 //! the ray is the cubic of a trilinear interpolant: eight corners, fetched once, give its value anywhere.
 //!
-//! Where a cell may hold much optical depth, the walk is *careful*: a lane whose pair of pieces is too thick waits
-//! for the next round, in which it takes only part of its cell. It also minds restarts of the integrals. Elsewhere
-//! both are left out of the code.
+//! A cell is taken as two straight pieces, read from the table of the transfer function. How far the field bends away
+//! from them, and how much depth and change of colour they hold, says what that may be off by at most: the *doubt* of the
+//! cell. Where it is above [`MAX_DOUBT`] the packet takes four pieces; where that cannot be enough, and in blocks for
+//! which the table is too coarse, the lane's cell is integrated by `exact` instead.
 
 use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
-use volery_frame::integral::Restart;
-
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::Occupancy;
-use crate::math::{axes, four, front_weight, opacity_of_depth};
+use crate::exact::{Bands, add_cells};
+use crate::math::{axes, four, front_weight, opacity_of_depth, transpose};
 use crate::packet::Span;
 use crate::texel::Texel;
 
-/// A careful walk shortens pairs of pieces of more optical depth: colour and extinction may run far
-/// from straight within what is seen of it.
-const MAX_PAIR_DEPTH: f32 = 1.4;
-
-/// No pair is shortened that passes fewer bins, since its ends are rounded to bins.
-pub(crate) const MIN_PAIR_BINS: f32 = 64.0;
-
-/// Nor a pair that is shorter, in unit lengths: lanes must come on.
-const MIN_PAIR_LENGTH: f32 = 0.004;
+/// The largest doubt of a cell, as a difference of a colour channel. Four pieces have a quarter of that of two.
+const MAX_DOUBT: f32 = 0.003;
 
 /// Light gathered so far.
 pub(crate) struct Light<S: Simd> {
@@ -39,7 +32,10 @@ pub(crate) struct Matter<'a, T> {
     /// Samples along x, y, z, each at least 2.
     pub(crate) samples: [u32; 3],
     pub(crate) texels: &'a [T],
+    /// Blocks that may hold matter.
     pub(crate) occupancy: &'a Occupancy,
+    /// Blocks for which the table is too coarse, if there are any.
+    pub(crate) exact: Option<&'a Occupancy>,
     /// Cells of a block per axis.
     pub(crate) block: u32,
 }
@@ -48,85 +44,65 @@ pub(crate) struct Matter<'a, T> {
 #[derive(Clone, Copy)]
 pub(crate) struct Table<'a> {
     pub(crate) entries: &'a [[f32; 4]],
+    /// Texels are counted from here.
+    pub(crate) texel_origin: f32,
     /// `bin = scale * texel + offset`.
     pub(crate) bin_from_texel: [f32; 2],
-    /// A cell in which twice the middle differs from the sum of the ends by more than this, in texels, is
-    /// integrated in four pieces instead of two.
-    pub(crate) max_bend: f32,
-    /// [`MIN_PAIR_BINS`] in texels.
-    pub(crate) min_pair: f32,
-    /// Where the integrals start anew.
-    pub(crate) restarts: &'a [Restart],
+    /// The largest change of light per texel and unit length.
+    pub(crate) slope: f32,
+    pub(crate) bands: Bands<'a>,
 }
 
 /// The integrals at one end of a piece.
 #[derive(Clone, Copy)]
 struct End<S: Simd> {
-    bin: i32x16<S>,
+    /// A whole number, however far beyond the table.
+    bin: f32x16<S>,
     /// `[∫ r s, ∫ g s, ∫ b s, ∫ s]`.
     integrals: [f32x16<S>; 4],
 }
 
 impl Table<'_> {
-    /// The bin of a texel value, which may stray from the range by rounding.
+    /// The bin of a texel: a whole number, however far beyond the table.
     #[inline(always)]
-    fn bin<S: Simd>(&self, simd: S, texel: f32x16<S>) -> i32x16<S> {
+    fn bin<S: Simd>(&self, simd: S, texel: f32x16<S>) -> f32x16<S> {
         let [scale, offset] = self.bin_from_texel;
-        let bin = texel.mul_add(f32x16::splat(simd, scale), f32x16::splat(simd, offset));
-        let last = (self.entries.len() - 2) as f32;
-        let bin = bin.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, last));
-        (bin + 0.5).to_int()
+        texel.mul_add(f32x16::splat(simd, scale), f32x16::splat(simd, offset)).round_ties_even()
     }
 
-    /// The end of a piece at a texel value, in another bin than `from`.
+    /// The end of a piece at a texel, in another bin than `from`.
     #[inline(always)]
-    fn end<S: Simd>(&self, simd: S, texel: f32x16<S>, from: i32x16<S>) -> End<S> {
+    fn end<S: Simd>(&self, simd: S, texel: f32x16<S>, from: f32x16<S>) -> End<S> {
         let bin = self.bin(simd, texel);
+        let entry = self.entry(simd, bin);
         // Two ends in one bin count as one whole bin: 2k goes with 2k + 1.
-        let bin = bin.simd_eq(from).select(bin ^ 1, bin);
-        self.at(simd, bin)
-    }
-
-    /// What the integrals grow by between two ends, across restarts.
-    #[inline(always)]
-    fn change<S: Simd>(&self, simd: S, from: &End<S>, to: &End<S>) -> [f32x16<S>; 4] {
-        let (mut start, mut end) = (from.integrals, to.integrals);
-        for restart in self.restarts {
-            let bin = i32x16::splat(simd, restart.bin as i32);
-            let rises = from.bin.simd_lt(bin) & to.bin.simd_ge(bin);
-            let falls = to.bin.simd_lt(bin) & from.bin.simd_ge(bin);
-            for (channel, &sum) in restart.sums.iter().enumerate() {
-                start[channel] = rises.select(start[channel] - sum, start[channel]);
-                end[channel] = falls.select(end[channel] - sum, end[channel]);
-            }
-        }
-        four(
-            #[inline(always)]
-            |i| end[i] - start[i],
-        )
+        let is_flat = bin.simd_eq(from);
+        let other = is_flat.select(entry ^ 1, entry);
+        let aside: f32x16<S> = (other - entry).to_float();
+        End { bin: bin + aside, integrals: self.integrals(simd, other) }
     }
 
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, bin: i32x16<S>) -> End<S> {
+    fn at<S: Simd>(&self, simd: S, texel: f32x16<S>) -> End<S> {
+        let bin = self.bin(simd, texel);
+        End { bin, integrals: self.integrals(simd, self.entry(simd, bin)) }
+    }
+
+    #[inline(always)]
+    fn entry<S: Simd>(&self, simd: S, bin: f32x16<S>) -> i32x16<S> {
+        let last = (self.entries.len() - 2) as f32;
+        bin.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, last)).to_int()
+    }
+
+    #[inline(always)]
+    fn integrals<S: Simd>(&self, simd: S, entry: i32x16<S>) -> [f32x16<S>; 4] {
         let mut rows = [0.0_f32; 64];
-        let bins: [i32; 16] = bin.into();
-        for (lane, &bin) in bins.iter().enumerate() {
-            rows[4 * lane..4 * lane + 4].copy_from_slice(&self.entries[bin as usize]);
+        let entries: [i32; 16] = entry.into();
+        for (lane, &entry) in entries.iter().enumerate() {
+            rows[4 * lane..4 * lane + 4].copy_from_slice(&self.entries[entry as usize]);
         }
-        End { bin, integrals: transpose(simd, &rows) }
+        transpose(simd, &rows)
     }
-}
-
-/// Four columns of sixteen rows.
-#[inline(always)]
-fn transpose<S: Simd>(simd: S, rows: &[f32; 64]) -> [f32x16<S>; 4] {
-    let [q0, q1, q2, q3] = four(
-        #[inline(always)]
-        |i| f32x16::from_slice(simd, &rows[16 * i..16 * i + 16]),
-    );
-    let (even01, odd01) = (q0.unzip_low(q1), q0.unzip_high(q1));
-    let (even23, odd23) = (q2.unzip_low(q3), q2.unzip_high(q3));
-    [even01.unzip_low(even23), odd01.unzip_low(odd23), even01.unzip_high(even23), odd01.unzip_high(odd23)]
 }
 
 impl<S: Simd> Light<S> {
@@ -135,26 +111,10 @@ impl<S: Simd> Light<S> {
         Self { color: [f32x16::splat(simd, 0.0); 3], transmittance: f32x16::splat(simd, 1.0) }
     }
 
-    /// Adds two pieces of `length` each, from `from` over the value `middle` to the value `last`; returns their end.
-    #[inline(always)]
-    fn gather(
-        &mut self,
-        simd: S,
-        table: Table<'_>,
-        from: End<S>,
-        middle: f32x16<S>,
-        last: f32x16<S>,
-        length: f32x16<S>,
-    ) -> End<S> {
-        let pair = Pair::new(simd, table, from, middle, last, length);
-        self.add(simd, &pair.pieces);
-        pair.end
-    }
-
-    /// Adds two neighbouring pieces of one length. What their mean colours differ by tells how the colour
+    /// Adds two neighbouring pieces of one length in `lanes`. What their mean colours differ by tells how the colour
     /// runs within each, so how much more of its front is seen than of its back.
     #[inline(always)]
-    fn add(&mut self, simd: S, pieces: &[Piece<S>; 2]) {
+    fn add(&mut self, simd: S, pieces: &[Piece<S>; 2], lanes: mask32x16<S>) {
         // Where one piece is much thinner than the other, its colour tells little of the other's.
         let (a, b) = (pieces[0].depth, pieces[1].depth);
         let (thin, thick) = (a.min(b), a.max(b));
@@ -163,13 +123,13 @@ impl<S: Simd> Light<S> {
             #[inline(always)]
             |i| (pieces[1].color(i) - pieces[0].color(i)) * trust,
         );
-        self.add_piece(simd, &pieces[0], &slope);
-        self.add_piece(simd, &pieces[1], &slope);
+        self.add_piece(simd, &pieces[0], &slope, lanes);
+        self.add_piece(simd, &pieces[1], &slope, lanes);
     }
 
     #[inline(always)]
-    fn add_piece(&mut self, simd: S, piece: &Piece<S>, slope: &[f32x16<S>; 3]) {
-        let alpha = opacity_of_depth(simd, piece.depth);
+    fn add_piece(&mut self, simd: S, piece: &Piece<S>, slope: &[f32x16<S>; 3], lanes: mask32x16<S>) {
+        let alpha = opacity_of_depth(simd, lanes.select(piece.depth, f32x16::splat(simd, 0.0)));
         let light = self.transmittance * alpha;
         let shift = front_weight(simd, piece.depth);
         self.color = axes(
@@ -209,17 +169,32 @@ impl<S: Simd> Pair<S> {
     ) -> Self {
         let middle = table.end(simd, middle, from.bin);
         let end = table.end(simd, last, middle.bin);
-        let pieces =
-            [Piece::new(simd, table, &from, &middle, length), Piece::new(simd, table, &middle, &end, length)];
+        let pieces = [Piece::new(simd, &from, &middle, length), Piece::new(simd, &middle, &end, length)];
         Self { pieces, end }
+    }
+
+    /// What the change of colour hides: within a piece the light of its front and its back are told apart by the
+    /// neighbouring piece only.
+    #[inline(always)]
+    fn doubt(&self) -> f32x16<S> {
+        let [a, b] = &self.pieces;
+        let [red, green, blue] = axes(
+            #[inline(always)]
+            |i| (b.color(i) - a.color(i)).abs(),
+        );
+        let depth = a.depth.max(b.depth);
+        depth * depth * red.max(green).max(blue) * (1.0 / 32.0)
     }
 }
 
 impl<S: Simd> Piece<S> {
     #[inline(always)]
-    fn new(simd: S, table: Table<'_>, from: &End<S>, to: &End<S>, length: f32x16<S>) -> Self {
-        let bins: f32x16<S> = (to.bin - from.bin).to_float();
-        let [r, g, b, extinction] = table.change(simd, from, to);
+    fn new(simd: S, from: &End<S>, to: &End<S>, length: f32x16<S>) -> Self {
+        let bins = to.bin - from.bin;
+        let [r, g, b, extinction] = four(
+            #[inline(always)]
+            |i| to.integrals[i] - from.integrals[i],
+        );
         let inverse = extinction.simd_ne(0.0).select(1.0 / extinction, f32x16::splat(simd, 0.0));
         let light = [r, g, b];
         Self { light, inverse, depth: length * extinction / bins }
@@ -245,8 +220,6 @@ struct Walker<'a, S: Simd> {
     /// Unit lengths from the entry.
     depth: f32x16<S>,
     active: mask32x16<S>,
-    /// The longest that the next round may take of a cell, in unit lengths.
-    reach: f32x16<S>,
 }
 
 impl<'a, S: Simd> Walker<'a, S> {
@@ -268,7 +241,6 @@ impl<'a, S: Simd> Walker<'a, S> {
             cell,
             depth: zero,
             active: span.active,
-            reach: f32x16::splat(simd, f32::INFINITY),
         }
     }
 
@@ -287,17 +259,18 @@ impl<'a, S: Simd> Walker<'a, S> {
         )
     }
 
-    /// Lanes that stand in a block without matter.
+    /// Lanes that stand in a marked block.
     #[inline(always)]
-    fn in_empty_block(&self, simd: S, occupancy: u8x64<S>) -> mask32x16<S> {
+    fn in_block(&self, simd: S, marks: &Occupancy) -> mask32x16<S> {
         let [x, y, z] = axes(
             #[inline(always)]
             |axis| (self.cell[axis] * (1.0 / self.block)).floor(),
         );
         let byte: u32x16<S> = z.mul_add(f32x16::splat(simd, 8.0), y).to_int();
-        let byte: u32x16<S> = simd.swizzle_dyn_u8x64(occupancy, byte.bitcast()).bitcast();
+        let byte: u32x16<S> =
+            simd.swizzle_dyn_u8x64(u8x64::from_slice(simd, marks), byte.bitcast()).bitcast();
         let bit: u32x16<S> = x.to_int();
-        ((byte >> bit) & 1).simd_eq(0) & self.active
+        ((byte >> bit) & 1).simd_ne(0) & self.active
     }
 
     /// Takes `lanes` to where they leave their block.
@@ -354,26 +327,11 @@ impl<'a, S: Simd> Walker<'a, S> {
         self.active = active;
     }
 
-    /// Lanes whose pair of pieces, over `values` and each `half` long, is too thick: their reach becomes shorter,
-    /// that of others longer.
+    /// Half of the product of what a lane moves along the axes, in cells, on a way of twice `half` unit lengths.
     #[inline(always)]
-    fn shorten(
-        &mut self,
-        simd: S,
-        table: Table<'_>,
-        from: End<S>,
-        [first, middle, last]: [f32x16<S>; 3],
-        half: f32x16<S>,
-    ) -> mask32x16<S> {
-        let pair = Pair::new(simd, table, from, balanced(first, middle, last), last, half);
-        let depth = pair.pieces[0].depth + pair.pieces[1].depth;
-        let passed = (middle - first).abs() + (last - middle).abs();
-        let thick = depth.simd_gt(MAX_PAIR_DEPTH)
-            & passed.simd_gt(table.min_pair)
-            & half.simd_gt(0.5 * MIN_PAIR_LENGTH);
-        let share = (1.5 * MAX_PAIR_DEPTH / depth).max(table.min_pair / passed);
-        self.reach = thick.select(half * share, self.reach + self.reach);
-        thick
+    fn volume(&self, half: f32x16<S>) -> f32x16<S> {
+        let [x, y, z] = self.span.direction;
+        (x * half) * (y * half) * (z * half) * 8.0
     }
 
     /// Position in the cell at `depth`, in [0, 1] along each axis.
@@ -400,10 +358,10 @@ struct Cell<S: Simd> {
 
 impl<S: Simd> Cell<S> {
     #[inline(always)]
-    fn new(corners: [f32x16<S>; 8]) -> Self {
+    fn new(corners: [f32x16<S>; 8], texel_origin: f32) -> Self {
         let low = four(
             #[inline(always)]
-            |i| corners[2 * i],
+            |i| corners[2 * i] - texel_origin,
         );
         let slope = four(
             #[inline(always)]
@@ -422,6 +380,46 @@ impl<S: Simd> Cell<S> {
         let far = (d - c).mul_add(y, c);
         (far - near).mul_add(z, near)
     }
+
+    /// The field on the straight way from one place in the cell to another, by powers of the share of the way.
+    #[inline(always)]
+    fn along(&self, from: [f32x16<S>; 3], to: [f32x16<S>; 3]) -> [f32x16<S>; 4] {
+        let [dx, dy, dz] = axes(
+            #[inline(always)]
+            |axis| to[axis] - from[axis],
+        );
+        let [x, y, z] = from;
+        let line = four(
+            #[inline(always)]
+            |i| [self.slope[i].mul_add(x, self.low[i]), self.slope[i] * dx],
+        );
+        // A line in y between two lines in x: a parabola; so once more in z.
+        let [near, far] = [0, 2].map(
+            #[inline(always)]
+            |i| {
+                let [a, b] = [line[i], line[i + 1]];
+                let (start, slope) = (b[0] - a[0], b[1] - a[1]);
+                [start.mul_add(y, a[0]), slope.mul_add(y, a[1]) + start * dy, slope * dy]
+            },
+        );
+        let [a, b, c] = axes(
+            #[inline(always)]
+            |i| far[i] - near[i],
+        );
+        [
+            a.mul_add(z, near[0]),
+            b.mul_add(z, near[1]) + a * dz,
+            c.mul_add(z, near[2]) + b * dz,
+            c * dz,
+        ]
+    }
+
+    /// The part of the field that no parabola is: the coefficient of `x y z`.
+    #[inline(always)]
+    fn twist(&self) -> f32x16<S> {
+        let [a, b, c, d] = self.slope;
+        (a - b) - (c - d)
+    }
 }
 
 /// The value for the middle of a cell, so that each of the straight lines to it from the cell's ends has the mean
@@ -435,10 +433,9 @@ fn balanced<S: Simd>(first: f32x16<S>, middle: f32x16<S>, last: f32x16<S>) -> f3
     one_way.select(moved.max(low).min(high), middle)
 }
 
-/// Adds the light of one brick to a packet. Unless the walk is `CAREFUL`, cells should not be dense,
-/// and the table must be without restarts.
+/// Adds the light of one brick to a packet.
 #[inline(always)]
-pub(crate) fn walk<S: Simd, T: Texel, const CAREFUL: bool>(
+pub(crate) fn walk<S: Simd, T: Texel>(
     simd: S,
     span: &Span<S>,
     matter: &Matter<'_, T>,
@@ -451,17 +448,16 @@ pub(crate) fn walk<S: Simd, T: Texel, const CAREFUL: bool>(
     let rows = [0, row, slice, slice + row].map(|offset| &matter.texels[offset..offset + reach]);
     let (row, slice) = (f32x16::splat(simd, row as f32), f32x16::splat(simd, slice as f32));
     let zero = f32x16::splat(simd, 0.0);
-    let table = if CAREFUL { table } else { Table { restarts: &[], ..table } };
+    let none = mask32x16::splat(simd, false);
 
-    let occupancy = u8x64::from_slice(simd, matter.occupancy);
     let mut walker = Walker::new(simd, span, matter);
     // Lanes whose last piece ended elsewhere than where the next begins.
     let mut fresh = walker.active;
-    let mut from = table.at(simd, i32x16::splat(simd, 0));
+    let mut from = table.at(simd, zero);
     let mut first = zero;
     loop {
         loop {
-            let empty = walker.in_empty_block(simd, occupancy);
+            let empty = walker.active & !walker.in_block(simd, matter.occupancy);
             if empty.all_false() {
                 break;
             }
@@ -473,46 +469,71 @@ pub(crate) fn walk<S: Simd, T: Texel, const CAREFUL: bool>(
         }
         let [x, y, z] = walker.cell;
         let address: i32x16<S> = z.mul_add(slice, y.mul_add(row, x)).to_int();
-        let cell = Cell::new(T::corners(simd, rows, address));
+        let cell = Cell::new(T::corners(simd, rows, address), table.texel_origin);
 
         let exit = walker.exits();
-        let mut end = exit[0].min(exit[1]).min(exit[2]).min(span.length);
-        if CAREFUL {
-            end = end.min(walker.depth + walker.reach);
-        }
-        let end = end.max(walker.depth);
+        let end = exit[0].min(exit[1]).min(exit[2]).min(span.length).max(walker.depth);
         let half = (end - walker.depth) * 0.5;
         if fresh.any_true() {
             let value = cell.value(walker.fraction(simd, walker.depth));
             first = fresh.select(value, first);
-            from = table.at(simd, fresh.select(table.bin(simd, value), from.bin));
+            let start = table.at(simd, first);
+            from.bin = fresh.select(start.bin, from.bin);
+            from.integrals = four(
+                #[inline(always)]
+                |i| fresh.select(start.integrals[i], from.integrals[i]),
+            );
         }
-        let middle = cell.value(walker.fraction(simd, walker.depth + half));
-        let last = cell.value(walker.fraction(simd, end));
-        // A blank corner makes every value of its cell NaN or infinite.
-        let blank = if T::CAN_BE_BLANK { !middle.is_finite() } else { mask32x16::splat(simd, false) };
-        let mut lanes = walker.active & !blank;
-        let mut waits = mask32x16::splat(simd, false);
-        if CAREFUL {
-            waits = walker.shorten(simd, table, from, [first, middle, last], half) & lanes;
-            lanes &= !waits;
+        let mut middle = cell.value(walker.fraction(simd, walker.depth + half));
+        let mut last = cell.value(walker.fraction(simd, end));
+        let mut blank = none;
+        if T::CAN_BE_BLANK {
+            // A blank corner makes every value of its cell NaN or infinite.
+            blank = !middle.is_finite();
+            middle = blank.select(zero, middle);
+            last = blank.select(zero, last);
+            first = blank.select(zero, first);
+            from.bin = blank.select(zero, from.bin);
         }
-        let length = lanes.select(half, zero);
+        let lanes = walker.active & !blank;
         let bend = (middle + middle - first - last).abs();
-        if (bend.simd_gt(table.max_bend) & lanes).any_true() {
+        let twist = (cell.twist() * walker.volume(half)).abs();
+        let doubt = (bend * (1.0 / 6.0) + twist * (1.0 / 16.0)) * (table.slope * half) * light.transmittance;
+        let mut exact = lanes & doubt.simd_gt(4.0 * MAX_DOUBT);
+        if let Some(blocks) = matter.exact {
+            exact |= lanes & walker.in_block(simd, blocks);
+        }
+        let near;
+        let mut far = None;
+        if (lanes & !exact & doubt.simd_gt(MAX_DOUBT)).any_true() {
             let quarter = half * 0.5;
             let early = cell.value(walker.fraction(simd, walker.depth + quarter));
             let late = cell.value(walker.fraction(simd, end - quarter));
-            let length = length * 0.5;
-            from = light.gather(simd, table, from, balanced(first, early, middle), middle, length);
-            from = light.gather(simd, table, from, balanced(middle, late, last), last, length);
+            near = Pair::new(simd, table, from, balanced(first, early, middle), middle, quarter);
+            let pair = Pair::new(simd, table, near.end, balanced(middle, late, last), last, quarter);
+            exact |= lanes & (pair.doubt() * light.transmittance).simd_gt(MAX_DOUBT);
+            from = pair.end;
+            far = Some(pair.pieces);
         } else {
-            from = light.gather(simd, table, from, balanced(first, middle, last), last, length);
+            near = Pair::new(simd, table, from, balanced(first, middle, last), last, half);
+            from = near.end;
+        }
+        exact |= lanes & (near.doubt() * light.transmittance).simd_gt(MAX_DOUBT);
+        if exact.any_true() {
+            let [from, to] = [walker.depth, end].map(
+                #[inline(always)]
+                |depth| walker.fraction(simd, depth),
+            );
+            add_cells(simd, table.bands, &cell.along(from, to), half + half, exact, light);
+        }
+        light.add(simd, &near.pieces, lanes & !exact);
+        if let Some(pieces) = far {
+            light.add(simd, &pieces, lanes & !exact);
         }
         first = last;
-        // Who waits finds its value again.
-        fresh = blank | waits;
-        walker.step(simd, &exit, if CAREFUL { waits.select(walker.depth, end) } else { end });
+        // Who was blank finds its value again.
+        fresh = blank;
+        walker.step(simd, &exit, end);
         walker.active &= light.transmittance.simd_gt(MIN_TRANSMITTANCE);
     }
 }

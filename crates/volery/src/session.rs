@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use volery_frame::{
-    Backend, Content, Cubes, Frame, Image, IntegratedTransfer, Planes, PointTransfer, Rays, Thickness,
+    Backend, Content, Cubes, Frame, Image, Planes, PointTransfer, RayTransfer, Rays, Thickness,
     VolumeLayout,
 };
 use volery_pyramid::{CubeTree, Kind, Node, NodeSource, Pyramid};
@@ -58,7 +58,7 @@ pub struct Session {
     backend: Box<dyn Backend>,
     volume: VolumeLayout,
     encoding: Encoding,
-    transfer: Option<(TransferFunction, IntegratedTransfer)>,
+    transfer: Option<(TransferFunction, RayTransfer)>,
     /// Of the technique plane, once an error was asked for.
     parts: OnceLock<Parts>,
     build_seconds: f64,
@@ -267,8 +267,7 @@ impl Session {
         match self.technique {
             Technique::Raycast => {
                 if self.transfer.as_ref().is_none_or(|(transfer, _)| *transfer != view.transfer) {
-                    let unit_length = self.volume.spacing.min_element();
-                    let table = IntegratedTransfer::new(&view.transfer, [low, high], unit_length);
+                    let table = RayTransfer::new(&view.transfer, &self.volume);
                     self.transfer = Some((view.transfer.clone(), table));
                 }
                 let tolerance = tolerance.unwrap_or(0.0);

@@ -3,7 +3,7 @@
 use volery_frame::backend::check_frame;
 use volery_frame::{
     Backend, Brick, BrickId, Content, Cubes, Device, DeviceKind, DrawError, Drawn, Frame, Image,
-    IntegratedTransfer, PlacedBrick, Planes, Rays, Sheets, UploadError, VolumeLayout,
+    PlacedBrick, Planes, RayTransfer, Rays, Sheets, UploadError, VolumeLayout,
 };
 use volery_shaders::raycast;
 
@@ -13,7 +13,7 @@ use crate::gpu::{Failure, Gpu};
 use crate::picture::{Band, band_size, draw_in_bands};
 use crate::plane::Plane;
 use crate::pool::Pool;
-use crate::raycast::{Form, Raycast, Resources, transfer_texture, units_texture};
+use crate::raycast::{Form, Raycast, Resources, bands_buffer, transfer_texture, units_texture};
 use crate::sheets::SheetStacks;
 use crate::surfaces::Surfaces;
 use crate::tiles::Tiles;
@@ -41,10 +41,11 @@ pub struct WgpuBackend {
 struct Prepared {
     generation: u64,
     bricks: Vec<PlacedBrick>,
-    transfer: IntegratedTransfer,
+    transfer: RayTransfer,
     units: Units,
     units_texture: wgpu::Texture,
     transfer_texture: wgpu::Texture,
+    bands: wgpu::Buffer,
     form: Form,
 }
 
@@ -113,9 +114,10 @@ impl WgpuBackend {
             )));
         }
         let has_blanks = rays.bricks.iter().any(|brick| resident[&brick.id].summary.has_blanks);
-        let (units_texture, transfer_texture) = self
-            .gpu
-            .checked(|| (units_texture(&self.gpu, &units), transfer_texture(&self.gpu, rays.transfer)))?;
+        let gpu = &self.gpu;
+        let (units_texture, transfer_texture, bands) = gpu.checked(|| {
+            (units_texture(gpu, &units), transfer_texture(gpu, rays.transfer), bands_buffer(gpu, rays.transfer))
+        })?;
         self.prepared = Some(Prepared {
             generation: pool.generation(),
             bricks: rays.bricks.to_vec(),
@@ -123,7 +125,8 @@ impl WgpuBackend {
             units,
             units_texture,
             transfer_texture,
-            form: Form::new(rays, layout, has_blanks),
+            bands,
+            form: Form::new(layout, has_blanks),
         });
         Ok(())
     }
@@ -144,11 +147,11 @@ impl WgpuBackend {
         let pipeline = self.raycast.pipeline(gpu, form)?;
         let held = (pool, &surfaces);
         let mut shader_frame = shader_frame(frame, rays.transfer, pool.layout(), &prepared.units, held);
-        let (units, transfer) = (&prepared.units_texture, &prepared.transfer_texture);
+        let Prepared { units_texture: units, transfer_texture: transfer, bands, .. } = prepared;
         let raycast = &self.raycast;
         let bind = |picture: &wgpu::Buffer, _| {
             let surfaces = surfaces.view();
-            raycast.bind(gpu, &Resources { units, atlas, transfer, picture, surfaces })
+            raycast.bind(gpu, &Resources { units, atlas, transfer, bands, picture, surfaces })
         };
         let passes = (raycast::TILE, &surfaces);
         draw_in_bands(gpu, &mut self.band, size, passes, bind, |pass, bound, rows| {

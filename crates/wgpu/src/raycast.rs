@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use volery_frame::{IntegratedTransfer, Rays, VolumeLayout};
+use volery_frame::{RayTransfer, TexelType, VolumeLayout};
 use volery_shaders::{Binding, raycast};
 
-use crate::bindings::bind_group_layout;
+use crate::bindings::{bind_group_layout, buffer};
 use crate::gpu::{Failure, Gpu};
 use crate::units::Units;
 
@@ -24,23 +24,16 @@ pub(crate) struct Raycast {
 pub(crate) struct Form {
     /// Texels may be blank.
     pub(crate) has_blanks: bool,
-    /// The transfer function's antiderivatives start anew somewhere.
-    pub(crate) has_restarts: bool,
-    /// A cell may hold more optical depth than one pair of pieces takes.
-    pub(crate) is_dense: bool,
+    /// Texels are whole numbers.
+    pub(crate) is_whole: bool,
     /// Rays end at surfaces.
     pub(crate) has_surfaces: bool,
 }
 
 impl Form {
-    pub(crate) fn new(rays: &Rays<'_>, layout: &VolumeLayout, has_blanks: bool) -> Self {
-        let level = rays.bricks.iter().map(|brick| brick.level).max().unwrap_or(0);
-        Self {
-            has_blanks,
-            has_restarts: !rays.transfer.restarts().is_empty(),
-            is_dense: rays.transfer.is_dense(layout, level),
-            has_surfaces: false,
-        }
+    pub(crate) fn new(layout: &VolumeLayout, has_blanks: bool) -> Self {
+        let is_whole = matches!(layout.texel, TexelType::U8 | TexelType::U16);
+        Self { has_blanks, is_whole, has_surfaces: false }
     }
 }
 
@@ -49,6 +42,7 @@ pub(crate) struct Resources<'a> {
     pub(crate) units: &'a wgpu::Texture,
     pub(crate) atlas: &'a wgpu::Texture,
     pub(crate) transfer: &'a wgpu::Texture,
+    pub(crate) bands: &'a wgpu::Buffer,
     pub(crate) picture: &'a wgpu::Buffer,
     pub(crate) surfaces: &'a wgpu::TextureView,
 }
@@ -94,6 +88,7 @@ impl Raycast {
             "atlas" => wgpu::BindingResource::TextureView(&atlas),
             "atlas_sampler" => wgpu::BindingResource::Sampler(&self.sampler),
             "transfer" => wgpu::BindingResource::TextureView(&transfer),
+            "bands" => resources.bands.as_entire_binding(),
             "surfaces" => wgpu::BindingResource::TextureView(resources.surfaces),
             // A binding that the shader gains and this does not know fails as one of the wrong kind.
             _ => resources.picture.as_entire_binding(),
@@ -156,8 +151,7 @@ fn pipeline(
         compilation_options: wgpu::PipelineCompilationOptions {
             constants: &[
                 (raycast::HAS_BLANKS, f64::from(form.has_blanks)),
-                (raycast::HAS_RESTARTS, f64::from(form.has_restarts)),
-                (raycast::IS_DENSE, f64::from(form.is_dense)),
+                (raycast::IS_WHOLE, f64::from(form.is_whole)),
                 (raycast::HAS_SURFACES, f64::from(form.has_surfaces)),
             ],
             ..Default::default()
@@ -173,10 +167,15 @@ pub(crate) fn units_texture(gpu: &Gpu, units: &Units) -> wgpu::Texture {
 }
 
 /// The transfer function's antiderivatives as a texture.
-pub(crate) fn transfer_texture(gpu: &Gpu, transfer: &IntegratedTransfer) -> wgpu::Texture {
+pub(crate) fn transfer_texture(gpu: &Gpu, transfer: &RayTransfer) -> wgpu::Texture {
     let bytes = bytemuck::cast_slice(transfer.entries());
     let dims = [transfer.entries().len() as u32, 1, 1];
     texture(gpu, "volery transfer", wgpu::TextureDimension::D2, wgpu::TextureFormat::Rgba32Float, dims, bytes)
+}
+
+/// The transfer function's bands as a buffer.
+pub(crate) fn bands_buffer(gpu: &Gpu, transfer: &RayTransfer) -> wgpu::Buffer {
+    buffer(gpu, "volery bands", transfer.bands(), wgpu::BufferUsages::STORAGE)
 }
 
 fn texture(

@@ -9,8 +9,9 @@
 
 use std::collections::HashMap;
 
-use volery_frame::{BrickId, IntegratedTransfer, PlacedBrick, VolumeLayout};
-use volery_shaders::raycast::{CELLS_SHIFT, LAYER_SHIFT, LEVEL_SHIFT, OCCUPIED};
+use volery_frame::ray_transfer::BinSet;
+use volery_frame::{BrickId, PlacedBrick, RayTransfer, VolumeLayout};
+use volery_shaders::raycast::{CELLS_SHIFT, EXACT, LAYER_SHIFT, LEVEL_SHIFT, OCCUPIED};
 
 use crate::blocks::{Summary, block_cells};
 
@@ -41,7 +42,7 @@ pub(crate) struct Resident {
 pub(crate) struct Matter<'a> {
     pub(crate) layout: &'a VolumeLayout,
     pub(crate) resident: &'a HashMap<BrickId, Resident>,
-    pub(crate) transfer: &'a IntegratedTransfer,
+    pub(crate) transfer: &'a RayTransfer,
     /// Slots in a layer of the pool.
     pub(crate) slots_per_layer: u32,
 }
@@ -54,9 +55,12 @@ impl Units {
         let dims = layout.cells.map(|cells| cells.div_ceil(unit_cells).max(1));
         let num_units = dims.iter().map(|&n| n as usize).product();
         let mut units = Self { unit_cells, dims, words: vec![[MAX_DISTANCE, 0]; num_units] };
+        let exact: Vec<_> = (0..=bricks.iter().map(|brick| brick.level).max().unwrap_or(0))
+            .map(|level| matter.transfer.exact_bins(layout, level))
+            .collect();
         for brick in bricks {
             if let Some(resident) = matter.resident.get(&brick.id) {
-                units.place(matter, brick, resident);
+                units.place(matter, &exact[brick.level as usize], brick, resident);
             }
         }
         units.measure_distances();
@@ -64,12 +68,8 @@ impl Units {
     }
 
     /// Marks the units of a brick's blocks that hold matter.
-    fn place(&mut self, matter: &Matter<'_>, brick: &PlacedBrick, resident: &Resident) {
+    fn place(&mut self, matter: &Matter<'_>, exact: &BinSet, brick: &PlacedBrick, resident: &Resident) {
         let layout = matter.layout;
-        let [scale, offset] = matter.transfer.bin_from_value();
-        let bin = |texel: f32| {
-            (scale * (layout.value_scale * f64::from(texel) + layout.value_offset) + offset) as f32
-        };
         let [x, y, z] = resident.summary.cells;
         let cells = x | y << CELLS_SHIFT | z << (2 * CELLS_SHIFT);
         let [row, layer] = [resident.slot % matter.slots_per_layer, resident.slot / matter.slots_per_layer];
@@ -77,12 +77,13 @@ impl Units {
         let edge = u64::from(block_cells(layout.brick_cells)) << brick.level;
         let blocks = resident.summary.num_blocks(layout.brick_cells);
         for (index, &[low, high]) in resident.summary.ranges.iter().enumerate() {
-            // A negative scale turns the range around.
-            let ends = [bin(low), bin(high)];
-            let is_empty = low > high;
-            if is_empty || matter.transfer.is_transparent(ends[0].min(ends[1]), ends[0].max(ends[1])) {
+            let [first, last] = matter.transfer.bins_of(low, high);
+            // Bins are rounded to nearest when a ray is classified, hence the half bin on either side.
+            let meets = |bins: &BinSet| low <= high && bins.meets(first - 0.5, last + 0.5);
+            if !meets(matter.transfer.visible_bins()) {
                 continue;
             }
+            let words = if meets(exact) { [words[0], words[1] | EXACT] } else { words };
             let index = index as u32;
             let at = [index % blocks[0], index / blocks[0] % blocks[1], index / blocks[0] / blocks[1]];
             let span: [std::ops::Range<u64>; 3] = std::array::from_fn(|axis| {

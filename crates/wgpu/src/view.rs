@@ -1,8 +1,7 @@
 //! From a frame to the numbers that the shader reads: in f64 up to the last step.
 
 use glam::DVec3;
-use volery_frame::integral::{MAX_RESTARTS, Restart};
-use volery_frame::{Frame, IntegratedTransfer, VolumeLayout};
+use volery_frame::{Frame, RayTransfer, VolumeLayout};
 use volery_scene::RayGrid;
 use volery_shaders::raycast;
 
@@ -32,19 +31,10 @@ fn rays_from(frame: &Frame<'_>, depth: f64) -> RayGrid {
     }
 }
 
-/// Something of each restart; zero where there is none.
-fn restarts<T: bytemuck::Zeroable + Copy, const N: usize>(
-    transfer: &IntegratedTransfer,
-    of: impl Fn(&Restart) -> T,
-) -> [T; N] {
-    const { assert!(N == MAX_RESTARTS) };
-    std::array::from_fn(|i| transfer.restarts().get(i).map_or(T::zeroed(), &of))
-}
-
 /// The shader's frame; the band of rows is still open.
 pub(crate) fn shader_frame(
     frame: &Frame<'_>,
-    transfer: &IntegratedTransfer,
+    transfer: &RayTransfer,
     layout: &VolumeLayout,
     units: &Units,
     (pool, surfaces): (&Pool, &FrameSurfaces<'_>),
@@ -57,12 +47,8 @@ pub(crate) fn shader_frame(
     let spacing = layout.spacing.max_element();
     let direction = |v: DVec3| (v / longest * (spacing / layout.spacing)).as_vec3().to_array();
     let depth = layout.spacing / transfer.unit_length() * std::f64::consts::LOG2_E;
-    let texels_per_unit = pool.texels_per_unit();
-    let [scale, offset] = transfer.bin_from_value();
-    // bin = scale * (value_scale * texel + value_offset) + offset, and its zero first, which f32 subtracts
-    // without loss.
-    let bins_per_texel = scale * layout.value_scale;
-    let texel_of_bin_zero = -(scale * layout.value_offset + offset) / bins_per_texel;
+    let [bins_per_texel, first_bin] = transfer.bin_from_texel();
+    let texels_per_step = pool.texels_per_unit();
     raycast::Frame {
         origin: in_cells(rays.origin),
         width: frame.width,
@@ -79,19 +65,22 @@ pub(crate) fn shader_frame(
         cells: layout.cells.map(|n| n as f32),
         bricks_per_cell: 1.0 / layout.brick_cells as f32,
         depth_per_cell: depth.as_vec3().to_array(),
-        texel_of_bin_zero: (texel_of_bin_zero / texels_per_unit) as f32,
+        texels_per_step: texels_per_step as f32,
         background: frame.background,
-        bins_per_texel: (bins_per_texel * texels_per_unit) as f32,
+        texel_origin: transfer.texel_origin() as f32,
         atlas_scale: pool.texture_size().map(|n| 1.0 / n as f32),
-        num_bins: transfer.num_bins() as f32,
+        last_entry: transfer.last_entry() as f32,
         slices_per_row: pool.slot().slices_per_row as f32,
         rows_per_slice: 1.0 / pool.slot().slices_per_row as f32,
         slot_height: pool.slot().size[1] as f32,
-        num_restarts: transfer.restarts().len() as u32,
+        bins_per_texel: bins_per_texel as f32,
+        first_bin: first_bin as f32,
+        // Depths of stretches are to the base 2.
+        slope: (transfer.slope() / std::f64::consts::LOG2_E) as f32,
+        depth_scale: transfer.depth_scale() as f32,
+        num_bands: transfer.bands().len() as u32,
         surface_offset: (surfaces.zero_depth() - start_depth) as f32,
         cells_per_depth: (longest / spacing) as f32,
-        restart_bins: restarts(transfer, |restart| [restart.bin as i32, 0, 0, 0]),
-        restart_sums: restarts(transfer, |restart| restart.sums),
         ..bytemuck::Zeroable::zeroed()
     }
 }

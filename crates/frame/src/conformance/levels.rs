@@ -77,7 +77,6 @@ pub fn coarse_levels_draw_what_they_hold(backend: &mut dyn Backend) {
         let medium = Medium {
             extent: volume.extent(),
             step: 1.0 / 24.0,
-            unit_length: 1.0,
             transfer: &tf,
             value: &|position| coarse.trilinear(position / 2.0),
         };

@@ -11,7 +11,7 @@
 //!
 //! # What a backend may do
 //! - Stop a ray once it lets through less than [`STOP_TRANSMITTANCE`] of the light; thresholds allow for it.
-//! - Round values to the bins of the frame's [`IntegratedTransfer`](crate::IntegratedTransfer).
+//! - Round values to the bins of the frame's [`RayTransfer`](crate::RayTransfer).
 //! - Nothing else: no sampling distance, no guard distance at the faces of bricks or of the volume.
 //!
 //! # Use

@@ -4,7 +4,6 @@ use glam::DVec3;
 use volery_scene::{Camera, Ray, TransferFunction};
 
 use crate::Image;
-use crate::integral::MAX_DEPTH_PER_UNIT;
 
 use super::world::Volume;
 
@@ -50,8 +49,6 @@ pub(super) struct Medium<'a> {
     pub(super) extent: DVec3,
     /// Longest step in world units.
     pub(super) step: f64,
-    /// World length that the cap on extinction refers to.
-    pub(super) unit_length: f64,
     pub(super) transfer: &'a TransferFunction,
     pub(super) value: &'a dyn Fn(DVec3) -> f64,
 }
@@ -66,8 +63,7 @@ pub(super) fn march(medium: &Medium<'_>, camera: &Camera, size: [u32; 2], backgr
         for i in 0..num_steps as u64 {
             let position = ray.origin + ray.direction * (t_in + (i as f64 + 0.5) * step);
             let (color, opacity) = medium.transfer.classify((medium.value)(position));
-            let extinction = medium.transfer.extinction_of_opacity(opacity);
-            let depth = extinction.min(MAX_DEPTH_PER_UNIT / medium.unit_length) * step;
+            let depth = medium.transfer.extinction_of_opacity(opacity) * step;
             let share = -(-depth).exp_m1() * transmittance;
             (0..3).for_each(|i| light[i] += share * color[i]);
             transmittance *= (-depth).exp();
@@ -92,7 +88,6 @@ pub(super) fn march_volume(
     let medium = Medium {
         extent: volume.extent(),
         step: spacing.min_element() / steps_per_cell,
-        unit_length: spacing.min_element(),
         transfer,
         value: &|position| volume.trilinear(position / spacing),
     };

@@ -18,7 +18,7 @@ pub fn error_falls_with_the_square_of_the_cell(backend: &mut dyn Backend) {
     let tf = smooth_transfer(0.08);
     let (extent, size) = (DVec3::ONE, [32, 32]);
     let camera = Camera::fitted(extent, 30.0, 20.0, 1.1, false);
-    let medium = Medium { extent, step: 1.0 / 2048.0, unit_length: 1.0 / 64.0, transfer: &tf, value: &field };
+    let medium = Medium { extent, step: 1.0 / 2048.0, transfer: &tf, value: &field };
     let expected = march(&medium, &camera, size, BACKGROUND_F64);
     assert_shows_something("analytic field", &expected, BACKGROUND_F64);
     let cells = [4_u32, 8, 16, 32];

@@ -4,7 +4,7 @@ use glam::{DVec3, UVec3};
 use volery_scene::{Camera, ControlPoint, Projection, TransferFunction};
 
 use crate::{
-    Backend, Brick, BrickId, Content, Frame, Image, IntegratedTransfer, PlacedBrick, Rays, TexelType, Texels,
+    Backend, Brick, BrickId, Content, Frame, Image, RayTransfer, PlacedBrick, Rays, TexelType, Texels,
     VolumeLayout,
 };
 
@@ -205,8 +205,8 @@ impl Volume {
     }
 
     /// The transfer function as a frame wants it.
-    pub(super) fn integrated(&self, transfer: &TransferFunction) -> IntegratedTransfer {
-        IntegratedTransfer::new(transfer, self.layout.value_range, self.layout.spacing.min_element())
+    pub(super) fn integrated(&self, transfer: &TransferFunction) -> RayTransfer {
+        RayTransfer::new(transfer, &self.layout)
     }
 }
 

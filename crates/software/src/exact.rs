@@ -1,0 +1,565 @@
+//! The light of single cells, exactly but for the arithmetic: for cells that the table of a transfer function is too
+//! coarse for.
+//!
+//! # Method
+//! Along a ray a cell's field is a cubic. It is followed in *intervals*, each of which stays within one band of the
+//! transfer function, where opacity and colour are linear in the field, and between turns of the cubic. In an interval
+//! extinction is sampled at three Gauss nodes; the integral of its interpolant gives the optical depth at the nodes, and
+//! Gauss quadrature there the colour (collocation, of order 6). An interval is made shorter where that would not do:
+//! - towards and from a pole of the extinction, so that what is missing to opaque changes by at most [`MAX_GROWTH`];
+//! - where much optical depth meets a change of colour, to [`MAX_DEPTH`].
+//!
+//! # Digits
+//! The cubic is kept as its Taylor series about the place reached, the texel as its distance from the band's lower end.
+//! Where the field enters a band it is set to the band's very end, so a shell between two texels has the length of its
+//! width over the slope, to f32's relative precision, be it a millionth of the cell: nothing is the difference of two
+//! places in the cell.
+//!
+//! # Error
+//! At most 2e-4 of the light that the cell lets through, measured against f64; f32 is behind most of it.
+
+use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*};
+use volery_frame::ray_transfer::Band;
+
+use crate::MIN_TRANSMITTANCE;
+use crate::math::{axes, clear_log, clear_of_depth, opacity_of_depth, transpose};
+use crate::walk::Light;
+
+/// What is missing to opaque changes at most by this factor in one interval.
+const MAX_GROWTH: f32 = 4.0;
+
+/// What is missing to opaque counts as nothing below this: the light of the rest is that of its middle.
+const MIN_CLEARNESS: f32 = 1e-3;
+
+/// Largest optical depth of an interval along which the colour changes.
+const MAX_DEPTH: f32 = 1.0;
+
+/// A smaller change of a channel is none.
+const MIN_TINT: f32 = 1e-3;
+
+/// Of an extinction without end.
+const OPAQUE: f32 = 1e30;
+
+/// Gauss-Legendre nodes on [0, 1].
+const NODES: [f32; 3] = [0.112_701_67, 0.5, 0.887_298_35];
+
+/// Their weights.
+const WEIGHTS: [f32; 3] = [5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0];
+
+/// The integral from 0 to a node (row) of the parabola that is 1 at one of the nodes and 0 at the others.
+const TO_NODE: [[f32; 3]; 3] = [
+    [5.0 / 36.0, -0.035_976_67, 0.009_789_444],
+    [0.300_263_2, 2.0 / 9.0, -0.022_485_417],
+    [0.267_988_33, 0.480_421_12, 5.0 / 36.0],
+];
+
+/// The bands of a transfer function.
+#[derive(Clone, Copy)]
+pub(crate) struct Bands<'a> {
+    pub(crate) bands: &'a [Band],
+    /// Optical depth of a unit length per `-ln(1 - opacity)`.
+    pub(crate) depth_scale: f32,
+}
+
+/// A band per lane.
+#[derive(Clone, Copy)]
+struct Row<S: Simd> {
+    base: f32x16<S>,
+    low: f32x16<S>,
+    high: f32x16<S>,
+    opacity: f32x16<S>,
+    opacity_slope: f32x16<S>,
+    clearness: f32x16<S>,
+    color: [f32x16<S>; 3],
+    color_slope: [f32x16<S>; 3],
+}
+
+impl Bands<'_> {
+    /// The band of each texel, counted from the origin.
+    #[inline(always)]
+    fn find<S: Simd>(&self, simd: S, texel: f32x16<S>) -> i32x16<S> {
+        let texels: [f32; 16] = texel.into();
+        let above = &self.bands[1..];
+        let band = texels.map(|texel| above.partition_point(|band| band.base <= texel) as i32);
+        i32x16::from_slice(simd, &band)
+    }
+
+    #[inline(always)]
+    fn rows<S: Simd>(&self, simd: S, band: i32x16<S>) -> Row<S> {
+        let bands: [i32; 16] = band.into();
+        let mut parts = [[0.0_f32; 64]; 3];
+        for (lane, &band) in bands.iter().enumerate() {
+            let row: &[f32; 12] = bytemuck::cast_ref(&self.bands[band as usize]);
+            for (part, numbers) in parts.iter_mut().enumerate() {
+                numbers[4 * lane..4 * lane + 4].copy_from_slice(&row[4 * part..4 * part + 4]);
+            }
+        }
+        let [base, low, high, opacity] = transpose(simd, &parts[0]);
+        let [opacity_slope, clearness, r, g] = transpose(simd, &parts[1]);
+        let [b, r_slope, g_slope, b_slope] = transpose(simd, &parts[2]);
+        let (color, color_slope) = ([r, g, b], [r_slope, g_slope, b_slope]);
+        Row { base, low, high, opacity, opacity_slope, clearness, color, color_slope }
+    }
+}
+
+impl<S: Simd> Row<S> {
+    /// What is missing to opaque at `u` texels from the base.
+    #[inline(always)]
+    fn clearness(&self, u: f32x16<S>) -> f32x16<S> {
+        self.clearness - self.opacity_slope * u
+    }
+
+    /// `-ln(1 - opacity)`, at most [`OPAQUE`].
+    #[inline(always)]
+    fn extinction(&self, simd: S, u: f32x16<S>) -> f32x16<S> {
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let opacity = self.opacity_slope.mul_add(u, self.opacity).max(zero).min(one);
+        let clearness = self.clearness(u).max(zero).min(one);
+        // Where rounding alone makes a texel opaque there is a pole nearby, not here.
+        let least = f32x16::splat(simd, f32::EPSILON / 4.0);
+        clear_log(simd, opacity, clearness.max(least))
+    }
+
+    /// Whether a band is opaque throughout.
+    #[inline(always)]
+    fn is_opaque(&self) -> mask32x16<S> {
+        self.clearness.simd_eq(0.0) & self.opacity_slope.simd_eq(0.0)
+    }
+}
+
+/// A polynomial of degree 3 about the place of each lane, by powers.
+type Cubic<S> = [f32x16<S>; 4];
+
+#[inline(always)]
+fn at<S: Simd>(cubic: &Cubic<S>, x: f32x16<S>) -> f32x16<S> {
+    cubic[3].mul_add(x, cubic[2]).mul_add(x, cubic[1]).mul_add(x, cubic[0])
+}
+
+#[inline(always)]
+fn slope_at<S: Simd>(cubic: &Cubic<S>, x: f32x16<S>) -> f32x16<S> {
+    (cubic[3] * 3.0).mul_add(x, cubic[2] * 2.0).mul_add(x, cubic[1])
+}
+
+/// The cubic about `x`.
+#[inline(always)]
+fn shifted<S: Simd>(cubic: &Cubic<S>, x: f32x16<S>) -> Cubic<S> {
+    [at(cubic, x), slope_at(cubic, x), (cubic[3] * 3.0).mul_add(x, cubic[2]), cubic[3]]
+}
+
+/// Where the cubic turns in (0, 1), in order; 1 where it does not.
+#[inline(always)]
+fn turns<S: Simd>(simd: S, [_, b, c, d]: &Cubic<S>) -> [f32x16<S>; 2] {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let root = (*c * *c - *d * *b * 3.0).sqrt();
+    let q = zero - (*c + c.simd_lt(zero).select(zero - root, root));
+    let [s, t] = [q / (*d * 3.0), *b / q].map(
+        #[inline(always)]
+        |x| (x.simd_gt(zero) & x.simd_lt(one)).select(x, one),
+    );
+    [s.min(t), s.max(t)]
+}
+
+/// Where a cubic, monotone on `[0, span]`, comes to `target` in `lanes`; `span` in others. Newton's method in a
+/// bracket that shrinks.
+#[inline(always)]
+fn reach<S: Simd>(
+    simd: S,
+    cubic: &Cubic<S>,
+    span: f32x16<S>,
+    [u_end, target]: [f32x16<S>; 2],
+    lanes: mask32x16<S>,
+) -> f32x16<S> {
+    if lanes.all_false() {
+        return span;
+    }
+    let zero = f32x16::splat(simd, 0.0);
+    let rises = (u_end - cubic[0]).simd_ge(zero);
+    let (mut low, mut high) = (zero, span);
+    let total = u_end - cubic[0];
+    let share = total.simd_ne(zero).select((target - cubic[0]) / total, zero);
+    let mut x = (share.max(zero).min(f32x16::splat(simd, 1.0))) * span;
+    for _ in 0..24 {
+        let residual = at(cubic, x) - target;
+        let is_before = residual.simd_lt(zero) ^ !rises;
+        low = is_before.select(x, low);
+        high = is_before.select(high, x);
+        let newton = x - residual / slope_at(cubic, x);
+        let inside = newton.simd_ge(low) & newton.simd_le(high);
+        let next = inside.select(newton, (low + high) * 0.5);
+        let moves = (next - x).abs().simd_gt(next.abs() * 2e-7) & residual.simd_ne(zero) & lanes;
+        x = residual.simd_ne(zero).select(next, x);
+        if moves.all_false() {
+            break;
+        }
+    }
+    lanes.select(x, span)
+}
+
+/// Where each lane stands in its cell.
+struct Course<S: Simd> {
+    /// The texel from the band's base, about the place reached; the whole way through the cell is 1.
+    cubic: Cubic<S>,
+    /// The way through the cell, as optical depth per `-ln(1 - opacity)`.
+    length: f32x16<S>,
+    turns: [f32x16<S>; 2],
+    band: i32x16<S>,
+    row: Row<S>,
+    /// Where the section between turns ends, and how far that is.
+    section_end: f32x16<S>,
+    span: f32x16<S>,
+    rises: mask32x16<S>,
+    active: mask32x16<S>,
+}
+
+/// The next interval of each lane.
+struct Interval<S: Simd> {
+    width: f32x16<S>,
+    /// The texel at its end.
+    target: f32x16<S>,
+    /// Whether the next band begins there.
+    crosses: mask32x16<S>,
+    /// Whether it ends for another reason before the section does.
+    is_cut: mask32x16<S>,
+}
+
+impl<S: Simd> Course<S> {
+    #[inline(always)]
+    fn new(simd: S, bands: Bands<'_>, cubic: &Cubic<S>, length: f32x16<S>, lanes: mask32x16<S>) -> Self {
+        let zero = f32x16::splat(simd, 0.0);
+        // Other lanes may hold anything, blanks too.
+        let cubic = &cubic.map(
+            #[inline(always)]
+            |coefficient| lanes.select(coefficient, zero),
+        );
+        let turns = turns(simd, cubic);
+        let band = bands.find(simd, cubic[0]);
+        let row = bands.rows(simd, band);
+        let mut course = Self {
+            cubic: [cubic[0] - row.base, cubic[1], cubic[2], cubic[3]],
+            length: length * bands.depth_scale,
+            turns,
+            band,
+            row,
+            section_end: zero,
+            span: zero,
+            rises: lanes,
+            active: lanes,
+        };
+        course.start_section(simd, lanes);
+        course
+    }
+
+    /// Goes on to the next section between turns.
+    #[inline(always)]
+    fn start_section(&mut self, simd: S, lanes: mask32x16<S>) {
+        let one = f32x16::splat(simd, 1.0);
+        let [first, second] = self.turns;
+        let next = first.simd_gt(self.section_end).select(first, second);
+        let next = next.simd_gt(self.section_end).select(next, one);
+        self.active &= !(lanes & self.section_end.simd_ge(one));
+        self.span = lanes.select(next - self.section_end, self.span);
+        self.section_end = lanes.select(next, self.section_end);
+        let rises = at(&self.cubic, self.span).simd_ge(self.cubic[0]);
+        self.rises = (lanes & rises) | (!lanes & self.rises);
+    }
+
+    /// The interval that begins where the lanes stand.
+    #[inline(always)]
+    fn next(&self, simd: S) -> Interval<S> {
+        let row = &self.row;
+        let u = self.cubic[0];
+        let u_end = at(&self.cubic, self.span);
+        let edge = self.rises.select(row.high, row.low);
+        let beyond = (self.rises & u_end.simd_gt(edge)) | (!self.rises & u_end.simd_lt(edge));
+        let target = beyond.select(edge, u_end);
+
+        let floor = f32x16::splat(simd, MIN_CLEARNESS);
+        let (now, then) = (row.clearness(u), row.clearness(target));
+        let least = (now * (1.0 / MAX_GROWTH)).max(floor);
+        let greatest = now.max(floor) * MAX_GROWTH;
+        let falls = now.simd_gt(floor * 1.01) & then.simd_lt(least * 0.99);
+        let grows = then.simd_gt(greatest * 1.01);
+        let is_cut = (falls | grows) & self.active;
+        let limit = (row.clearness - falls.select(least, greatest)) / row.opacity_slope;
+        let target = is_cut.select(limit, target);
+        let crosses = beyond & !is_cut & self.active;
+        let width = reach(simd, &self.cubic, self.span, [u_end, target], crosses | is_cut);
+        self.shallow(simd, Interval { width, target, crosses, is_cut })
+    }
+
+    /// The interval, or where it is deep and coloured a part of it.
+    #[inline(always)]
+    fn shallow(&self, simd: S, interval: Interval<S>) -> Interval<S> {
+        let row = &self.row;
+        let u = self.cubic[0];
+        let slope = row.color_slope[0].abs().max(row.color_slope[1].abs()).max(row.color_slope[2].abs());
+        let is_tinted = (slope * (interval.target - u).abs()).simd_gt(MIN_TINT);
+        let first = self.depth_per_width(simd, u);
+        let depth = interval.width * first.max(self.depth_per_width(simd, interval.target));
+        let is_deep = is_tinted & depth.simd_gt(MAX_DEPTH) & self.active;
+        if is_deep.all_false() {
+            return interval;
+        }
+        let mut width = interval.width;
+        for _ in 0..4 {
+            let steepest = first.max(self.depth_per_width(simd, at(&self.cubic, width)));
+            // The roots apart, lest their product be nothing.
+            width = width.min(width.sqrt() * (MAX_DEPTH / steepest).sqrt());
+        }
+        let steepest = first.max(self.depth_per_width(simd, at(&self.cubic, width)));
+        let width = is_deep.select(width.min(1.5 * MAX_DEPTH / steepest), interval.width);
+        Interval {
+            width,
+            target: is_deep.select(at(&self.cubic, width), interval.target),
+            crosses: interval.crosses & !is_deep,
+            is_cut: interval.is_cut | is_deep,
+        }
+    }
+
+    #[inline(always)]
+    fn depth_per_width(&self, simd: S, u: f32x16<S>) -> f32x16<S> {
+        let opaque = f32x16::splat(simd, OPAQUE);
+        self.row.is_opaque().select(opaque, self.row.extinction(simd, u)) * self.length
+    }
+
+    /// The light of an interval.
+    #[inline(always)]
+    fn add(&self, simd: S, interval: &Interval<S>, light: &mut Light<S>) {
+        let row = &self.row;
+        let zero = f32x16::splat(simd, 0.0);
+        let texels = axes(
+            #[inline(always)]
+            |i| at(&self.cubic, interval.width * NODES[i]),
+        );
+        let is_opaque = texels[0].simd_eq(texels[2]) & row.clearness(texels[1]).simd_le(zero) | row.is_opaque();
+        let depths = axes(
+            #[inline(always)]
+            |i| {
+                let extinction = is_opaque.select(f32x16::splat(simd, OPAQUE), row.extinction(simd, texels[i]));
+                extinction * (self.length * interval.width)
+            },
+        );
+        let depth = depths[0] * WEIGHTS[0] + depths[1] * WEIGHTS[1] + depths[2] * WEIGHTS[2];
+        let depth = self.active.select(depth, zero);
+        // What counts is the share of each node in what is seen: of depths of any size.
+        let scale = 1.0 / depths[0].max(depths[1]).max(depths[2]).max(f32x16::splat(simd, 1e-37));
+        let seen = axes(
+            #[inline(always)]
+            |i| {
+                let [a, b, c] = TO_NODE[i];
+                let front = (depths[0] * a + depths[1] * b + depths[2] * c).max(zero);
+                let clear = clear_of_depth(simd, front.min(f32x16::splat(simd, 40.0)));
+                depths[i] * scale * WEIGHTS[i] * clear
+            },
+        );
+        let sum = seen[0] + seen[1] + seen[2];
+        let share = sum.simd_gt(zero).select(light.transmittance * opacity_of_depth(simd, depth) / sum, zero);
+        let shift = seen[0] * texels[0] + seen[1] * texels[1] + seen[2] * texels[2];
+        light.color = axes(
+            #[inline(always)]
+            |i| {
+                let color = row.color[i] * sum + row.color_slope[i] * shift;
+                color.mul_add(share, light.color[i])
+            },
+        );
+        light.transmittance -= light.transmittance * opacity_of_depth(simd, depth);
+    }
+
+    /// Takes the lanes to the end of an interval.
+    #[inline(always)]
+    fn advance(&mut self, simd: S, bands: Bands<'_>, interval: &Interval<S>) {
+        self.cubic = shifted(&self.cubic, interval.width);
+        self.span = (self.span - interval.width).max(f32x16::splat(simd, 0.0));
+        self.cubic[0] = interval.is_cut.select(interval.target, self.cubic[0]);
+        if interval.crosses.any_true() {
+            let one = i32x16::splat(simd, 1);
+            let next = self.rises.select(self.band + one, self.band - one);
+            self.band = interval.crosses.select(next, self.band);
+            self.row = bands.rows(simd, self.band);
+            let start = self.rises.select(self.row.low, self.row.high);
+            self.cubic[0] = interval.crosses.select(start, self.cubic[0]);
+        }
+        let ends = self.active & !interval.crosses & !interval.is_cut;
+        if ends.any_true() {
+            self.start_section(simd, ends);
+        }
+    }
+}
+
+/// Adds the light of one cell per lane. `cubic` is the texel along the way through it, from the origin of texels, by
+/// powers of the share of the way; `length` is that way in unit lengths.
+#[inline(never)]
+pub(crate) fn add_cells<S: Simd>(
+    simd: S,
+    bands: Bands<'_>,
+    cubic: &[f32x16<S>; 4],
+    length: f32x16<S>,
+    lanes: mask32x16<S>,
+    light: &mut Light<S>,
+) {
+    // A function of its own, once for all types of texels.
+    simd.vectorize(
+        #[inline(always)]
+        || follow(simd, bands, cubic, length, lanes, light),
+    );
+}
+
+#[inline(always)]
+fn follow<S: Simd>(
+    simd: S,
+    bands: Bands<'_>,
+    cubic: &[f32x16<S>; 4],
+    length: f32x16<S>,
+    lanes: mask32x16<S>,
+    light: &mut Light<S>,
+) {
+    let mut course = Course::new(simd, bands, cubic, length, lanes);
+    // Three sections of every band, each cut towards and from a pole; dense ones end by their depth.
+    for _ in 0..64 + 64 * bands.bands.len() {
+        if course.active.all_false() {
+            return;
+        }
+        let interval = course.next(simd);
+        course.add(simd, &interval, light);
+        course.advance(simd, bands, &interval);
+        course.active &= light.transmittance.simd_gt(MIN_TRANSMITTANCE);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+    use glam::DVec3;
+    use volery_frame::{RayTransfer, TexelType, VolumeLayout};
+    use volery_reference::Tracer;
+    use volery_scene::{ControlPoint, Ray, Samples, TransferFunction, VoxelGrid};
+
+    use super::*;
+
+    /// Numbers in [0, 1) from a seed.
+    struct Chance(u64);
+
+    impl Chance {
+        fn next(&mut self) -> f64 {
+            // splitmix64
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        }
+
+        fn below(&mut self, n: usize) -> usize {
+            (self.next() * n as f64) as usize
+        }
+    }
+
+    /// A transfer function of one family over values from 0 to 1.
+    fn transfer(family: &str, chance: &mut Chance) -> TransferFunction {
+        let num = 2 + chance.below(6);
+        let mut values: Vec<f64> = (0..num).map(|_| chance.next()).collect();
+        let mut unit_distance = 1.0;
+        let mut opacity: Box<dyn FnMut(usize, &mut Chance) -> f64> = Box::new(|_, chance| chance.next());
+        match family {
+            "ramps" => {}
+            "poles" => opacity = Box::new(|_, chance| if chance.next() < 0.5 { 1.0 } else { chance.next() }),
+            "steps" => values.extend(values.clone()),
+            "comb" => {
+                values = (0..200).map(|i| f64::from(i) / 199.0).collect();
+                opacity = Box::new(|i, chance| if i % 2 == 0 { 0.0 } else { chance.next() });
+            }
+            "shell" => {
+                let (at, half) = (chance.next(), 10.0_f64.powf(-1.0 - 4.0 * chance.next()));
+                values = vec![at - half, at, at + half];
+                unit_distance = half * 10.0;
+                opacity = Box::new(|i, chance| if i == 1 { 0.1 + 0.9 * chance.next() } else { 0.0 });
+            }
+            "dense" => unit_distance = 10.0_f64.powf(-4.0 * chance.next()),
+            _ => unit_distance = 1e4,
+        }
+        values.sort_by(f64::total_cmp);
+        let point = |(i, value)| ControlPoint {
+            value,
+            color: [chance.next(), chance.next(), chance.next()],
+            opacity: opacity(i, chance),
+        };
+        TransferFunction::new(values.into_iter().enumerate().map(point).collect(), unit_distance).unwrap()
+    }
+
+    /// The field on a way through a cell of these corners, by powers of the share of the way.
+    fn cubic(corners: &[f64], from: DVec3, to: DVec3) -> [f64; 4] {
+        let at = |t: f64| {
+            let p = from + (to - from) * t;
+            (0..8)
+                .map(|i| {
+                    let side = |bit: usize, w: f64| if i >> bit & 1 == 1 { w } else { 1.0 - w };
+                    corners[i] * side(0, p.x) * side(1, p.y) * side(2, p.z)
+                })
+                .sum::<f64>()
+        };
+        // Through four points.
+        let [a, b, c, d] = [at(0.0), at(1.0 / 3.0), at(2.0 / 3.0), at(1.0)];
+        let third = (d - 3.0 * c + 3.0 * b - a) * 4.5;
+        let second = (c - 2.0 * b + a) * 4.5 - third;
+        [a, d - a - second - third, second, third]
+    }
+
+    /// Against the reference, which shares nothing with this.
+    #[test]
+    fn cells_of_every_kind_are_those_of_the_reference() {
+        let mut chance = Chance(7);
+        for family in ["ramps", "poles", "steps", "comb", "shell", "dense", "thin"] {
+            let mut worst = (0.0, String::new());
+            for case in 0..3000 {
+                let flat = case % 10 == 0;
+                let corners: Vec<f64> = (0..8).map(|_| chance.next()).collect();
+                let corners = if flat { vec![corners[0]; 8] } else { corners };
+                let tf = transfer(family, &mut chance);
+                let grid = VoxelGrid::new([2; 3], DVec3::ONE, Samples::F64(corners.clone().into())).unwrap();
+                let mut side = |axis: usize, at: f64| {
+                    let mut p = DVec3::new(chance.next(), chance.next(), chance.next());
+                    p[axis] = at;
+                    p
+                };
+                let (from, to) = (side(case % 3, 0.0), side((case + case / 3) % 3, 1.0));
+                let way = to - from;
+                let tracer = Tracer::new(&grid, &tf).unwrap();
+                let expected = tracer.trace(&Ray { origin: from - way, direction: way.normalize() });
+                let layout = VolumeLayout {
+                    cells: [1; 3],
+                    spacing: DVec3::ONE,
+                    brick_cells: 1,
+                    texel: TexelType::F32,
+                    value_scale: 1.0,
+                    value_offset: 0.0,
+                    value_range: [0.0, 1.0],
+                };
+                let transfer = RayTransfer::new(&tf, &layout);
+                let bands =
+                    Bands { bands: transfer.bands(), depth_scale: transfer.depth_scale() as f32 };
+                let mut powers = cubic(&corners, from, to);
+                powers[0] -= transfer.texel_origin();
+                let found = dispatch!(Level::new(), simd => {
+                    let splat = |x: f64| f32x16::splat(simd, x as f32);
+                    let powers = powers.map(splat);
+                    let mut light = Light::none(simd);
+                    let all = mask32x16::splat(simd, true);
+                    add_cells(simd, bands, &powers, splat(way.length()), all, &mut light);
+                    let color: [[f32; 16]; 3] = light.color.map(Into::into);
+                    let clear: [f32; 16] = light.transmittance.into();
+                    [color[0][3], color[1][3], color[2][3], clear[3]]
+                });
+                let [r, g, b] = expected.color;
+                let error = [r, g, b, expected.transmittance]
+                    .iter()
+                    .zip(found)
+                    .map(|(e, f)| (e - f64::from(f)).abs())
+                    .fold(0.0, f64::max);
+                if !(error <= worst.0) {
+                    worst = (error, format!("case {case}, {found:?} for {expected:?}, {powers:?}, {tf:?}"));
+                }
+            }
+            println!("{family}: error {:.2e} (threshold 1e-3)\n    {}", worst.0, worst.1);
+        }
+    }
+}
