@@ -40,6 +40,27 @@ pub struct Drawn {
     pub image: Image,
     /// Seconds that the device itself measured for the draw, where it can.
     pub device_seconds: Option<f64>,
+    /// Of rays: what their integration may be off by.
+    pub ray_doubt: Option<RayDoubt>,
+}
+
+/// What the rays of a picture may be off by, but for the arithmetic; each number the largest of any ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RayDoubt {
+    /// The sum over cells of what straight pieces in place of the field, and mean colours in place of running ones, may
+    /// change in a channel.
+    pub cells: f32,
+    /// The way through cells that were read from the table of the transfer function, in unit lengths, each stretch as a
+    /// share of the light that comes through: what rounding to bins can act on.
+    pub table_way: f32,
+}
+
+impl RayDoubt {
+    /// The larger of each number.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self { cells: self.cells.max(other.cells), table_way: self.table_way.max(other.table_way) }
+    }
 }
 
 /// Why bricks could not be made resident. The backend holds what it held before.

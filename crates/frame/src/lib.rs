@@ -31,7 +31,7 @@ pub mod planes;
 pub mod ray_transfer;
 pub mod sheets;
 
-pub use backend::{Backend, Device, DeviceKind, DrawError, Drawn, Image, UploadError};
+pub use backend::{Backend, Device, DeviceKind, DrawError, Drawn, Image, RayDoubt, UploadError};
 pub use brick::{Brick, BrickId, PlacedBrick, TexelType, Texels, VolumeLayout};
 pub use brick_grid::BrickGrid;
 pub use cubes::{Cube, Cubes, Thickness};

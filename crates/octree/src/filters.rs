@@ -1,7 +1,7 @@
 //! The filters: data tolerance, view frustum, transparency, cutting planes, point of interest.
 
 use glam::DVec3;
-use volery_pyramid::{Layout, Node, NodeSource};
+use volery_pyramid::{Layout, Node, NodeSource, NodeStats};
 use volery_scene::{Camera, Plane, Projection, TransferFunction};
 
 use crate::section::IndexPlane;
@@ -10,7 +10,8 @@ use crate::select::{Answer, Filter};
 /// Draws a node whose data error is below a tolerance, else descends.
 ///
 /// *Strictly* below: tolerance 0 gives the finest level everywhere, and an infinite error (blank samples)
-/// is below no tolerance. Level 0 is always drawn. Of several channels the worst counts.
+/// is below no tolerance. But a node all of whose samples are equal shows the very same field, and is drawn under any
+/// tolerance. Level 0 is always drawn. Of several channels the worst counts.
 pub struct DataTolerance<'a> {
     /// Where the errors come from.
     pub source: &'a dyn NodeSource,
@@ -20,7 +21,9 @@ pub struct DataTolerance<'a> {
 
 impl Filter for DataTolerance<'_> {
     fn answer(&mut self, node: Node) -> Answer {
-        let good = node.level == 0 || self.source.stats(node).iter().all(|s| s.error < self.tolerance);
+        let is_constant = |s: &NodeStats| s.error == 0.0 && s.min == s.max;
+        let is_good = |s: &NodeStats| s.error < self.tolerance || is_constant(s);
+        let good = node.level == 0 || self.source.stats(node).iter().all(is_good);
         if good { Answer::Draw } else { Answer::Descend }
     }
 }

@@ -1,7 +1,7 @@
 //! Packets of 16 rays, and where they enter and leave bricks.
 
 use fearless_simd::{f32x16, f64x8, mask32x16, prelude::*};
-use glam::DVec3;
+use volery_frame::VolumeLayout;
 use volery_scene::RayGrid;
 
 use crate::math::axes;
@@ -9,6 +9,9 @@ use crate::surfaces::Surfaces;
 
 /// Pixels of a packet per axis; a lane is `column + 4 * row`.
 pub(crate) const PACKET: u32 = 4;
+
+/// Finest cells per unit length below which a ray stands still along an axis: 1e-18 of a volume of 1e9 cells.
+const STILL: f64 = 1e-30;
 
 /// Sixteen f64, one per lane.
 type Wide<S> = [f64x8<S>; 2];
@@ -41,12 +44,12 @@ pub(crate) struct Span<S: Simd> {
 
 impl<S: Simd> Packet<S> {
     /// The rays of the packet whose upper left pixel is `(column, row)`, to where surfaces are. Pixels outside the
-    /// picture are as good as others.
+    /// picture are as good as others. Rays in the volume's faces run inside of it.
     #[inline(always)]
     pub(crate) fn new(
         simd: S,
         (rays, surfaces): (&RayGrid, &Surfaces),
-        spacing: DVec3,
+        layout: &VolumeLayout,
         unit_length: f64,
         column: u32,
         row: u32,
@@ -58,12 +61,18 @@ impl<S: Simd> Packet<S> {
             let [column, row] = [column + lane % PACKET, row + lane / PACKET];
             let ray = rays.pixel(column, row);
             end[lane as usize] = surfaces.distance(column, row) / unit_length;
-            let o = ray.origin / spacing;
-            let d = ray.direction * unit_length / spacing;
+            let o = ray.origin / layout.spacing;
+            let d = ray.direction * (unit_length / layout.spacing);
             for axis in 0..3 {
-                origin[axis][lane as usize] = o[axis];
-                // A ray that stands still along an axis creeps forward, so that 1 / d exists, in f32 too.
-                direction[axis][lane as usize] = if d[axis].abs() < 1e-30 { 1e-30 } else { d[axis] };
+                let stands = d[axis].abs() < STILL;
+                let (cells, spacing) = (f64::from(layout.cells[axis]), layout.spacing[axis]);
+                let is_inside = (0.0..=cells * spacing).contains(&ray.origin[axis]);
+                let clamped = o[axis].clamp(0.0, cells.next_down());
+                origin[axis][lane as usize] = if stands && is_inside { clamped } else { o[axis] };
+                // A ray that stands still along an axis creeps, so that 1 / d exists, in f32 too: away from the last
+                // face, which rounding may take it to.
+                let creep = if o[axis] < cells - 0.5 { STILL } else { -STILL };
+                direction[axis][lane as usize] = if stands { creep } else { d[axis] };
             }
         }
         let wide = |values: &[f64; 16]| [0, 8].map(|half| f64x8::from_slice(simd, &values[half..half + 8]));

@@ -4,7 +4,7 @@ use fearless_simd::{Level, dispatch, mask32x16, prelude::*};
 use glam::DVec3;
 use rayon::prelude::*;
 use volery_frame::ray_transfer::BinSet;
-use volery_frame::{DrawError, Frame, RayTransfer, PlacedBrick, Rays, VolumeLayout};
+use volery_frame::{DrawError, Frame, PlacedBrick, RayDoubt, RayTransfer, Rays, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use crate::MIN_TRANSMITTANCE;
@@ -51,7 +51,7 @@ pub(crate) fn draw<T: Texel>(
     content: &Rays<'_>,
     layout: &VolumeLayout,
     bricks: &Bricks<T>,
-) -> Result<Vec<[f32; 3]>, DrawError> {
+) -> Result<(Vec<[f32; 3]>, RayDoubt), DrawError> {
     let Rays { transfer, bricks: placed_bricks } = *content;
     let projector = Projector::new(frame, layout);
     let stored: Vec<_> = placed_bricks
@@ -78,11 +78,13 @@ pub(crate) fn draw<T: Texel>(
     let shared = Shared { layout, unit_length: transfer.unit_length(), rays, surfaces, table, drawables };
 
     let columns = frame.width.div_ceil(TILE);
-    let tiles: Vec<Vec<[f32; 3]>> = (0..columns * frame.height.div_ceil(TILE))
+    let tiles: Vec<(Vec<[f32; 3]>, RayDoubt)> = (0..columns * frame.height.div_ceil(TILE))
         .into_par_iter()
         .map(|i| dispatch!(level, simd => draw_tile(simd, &shared, i % columns, i / columns)))
         .collect();
-    Ok(assembled(frame, &tiles))
+    let (tiles, doubts): (Vec<_>, Vec<_>) = tiles.into_iter().unzip();
+    let doubt = doubts.into_iter().fold(RayDoubt::default(), RayDoubt::max);
+    Ok((assembled(frame, &tiles), doubt))
 }
 
 /// The picture of its tiles, [`TILE`] pixels square each, row by row.
@@ -192,7 +194,13 @@ pub(crate) fn tile_behind(surfaces: &Surfaces, column: u32, row: u32) -> Vec<[f3
 
 /// Draws one tile, whole even where it reaches over the edge of the picture.
 #[inline(always)]
-fn draw_tile<S: Simd, T: Texel>(simd: S, shared: &Shared<'_, T>, tile_x: u32, tile_y: u32) -> Vec<[f32; 3]> {
+fn draw_tile<S: Simd, T: Texel>(
+    simd: S,
+    shared: &Shared<'_, T>,
+    tile_x: u32,
+    tile_y: u32,
+) -> (Vec<[f32; 3]>, RayDoubt) {
+    let mut doubt = RayDoubt::default();
     let [first_column, first_row] = [tile_x * TILE, tile_y * TILE];
     let mut pixels = tile_behind(shared.surfaces, first_column, first_row);
     let inside = |d: &Drawable<'_, T>| {
@@ -201,13 +209,18 @@ fn draw_tile<S: Simd, T: Texel>(simd: S, shared: &Shared<'_, T>, tile_x: u32, ti
     };
     let drawables: Vec<_> = shared.drawables.iter().filter(|d| inside(d)).collect();
     if drawables.is_empty() {
-        return pixels;
+        return (pixels, doubt);
     }
     for y in (0..TILE).step_by(PACKET as usize) {
         for x in (0..TILE).step_by(PACKET as usize) {
             let light = draw_packet(simd, shared, &drawables, first_column + x, first_row + y);
             let [r, g, b]: [[f32; 16]; 3] = light.color.map(Into::into);
             let clear: [f32; 16] = light.transmittance.into();
+            let worst = |lanes: [f32; 16]| lanes.into_iter().fold(0.0, f32::max);
+            doubt = doubt.max(RayDoubt {
+                cells: worst(light.doubt.into()),
+                table_way: worst(light.table_way.into()),
+            });
             for lane in 0..16 {
                 let pixel = (y + lane as u32 / PACKET) * TILE + x + lane as u32 % PACKET;
                 let background = pixels[pixel as usize];
@@ -219,7 +232,7 @@ fn draw_tile<S: Simd, T: Texel>(simd: S, shared: &Shared<'_, T>, tile_x: u32, ti
             }
         }
     }
-    pixels
+    (pixels, doubt)
 }
 
 #[inline(always)]
@@ -232,7 +245,7 @@ fn draw_packet<S: Simd, T: Texel>(
 ) -> Light<S> {
     let unit_length = shared.unit_length;
     let rays = (&shared.rays, shared.surfaces);
-    let packet = Packet::new(simd, rays, shared.layout.spacing, unit_length, column, row);
+    let packet = Packet::new(simd, rays, shared.layout, unit_length, column, row);
     let mut light = Light::none(simd);
     let mut wanted = mask32x16::splat(simd, true);
     for drawable in drawables {

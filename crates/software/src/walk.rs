@@ -13,7 +13,7 @@ use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::Occupancy;
-use crate::exact::{Bands, add_cells};
+use crate::exact::{Bands, EXACT_DOUBT, add_cells};
 use crate::math::{axes, four, front_weight, opacity_of_depth, transpose};
 use crate::packet::Span;
 use crate::texel::Texel;
@@ -25,6 +25,11 @@ const MAX_DOUBT: f32 = 0.003;
 pub(crate) struct Light<S: Simd> {
     pub(crate) color: [f32x16<S>; 3],
     pub(crate) transmittance: f32x16<S>,
+    /// What a channel may be off by, but for the arithmetic: the doubts of all cells.
+    pub(crate) doubt: f32x16<S>,
+    /// The way through cells that were read from the table, in unit lengths, as it is seen: each stretch as a share of
+    /// the light that comes through.
+    pub(crate) table_way: f32x16<S>,
 }
 
 /// A brick with all that a packet needs of it.
@@ -108,7 +113,8 @@ impl Table<'_> {
 impl<S: Simd> Light<S> {
     #[inline(always)]
     pub(crate) fn none(simd: S) -> Self {
-        Self { color: [f32x16::splat(simd, 0.0); 3], transmittance: f32x16::splat(simd, 1.0) }
+        let zero = f32x16::splat(simd, 0.0);
+        Self { color: [zero; 3], transmittance: f32x16::splat(simd, 1.0), doubt: zero, table_way: zero }
     }
 
     /// Adds two neighbouring pieces of one length in `lanes`. What their mean colours differ by tells how the colour
@@ -505,30 +511,38 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         }
         let near;
         let mut far = None;
+        let (mut doubt, mut color_doubt) = (doubt, zero);
         if (lanes & !exact & doubt.simd_gt(MAX_DOUBT)).any_true() {
             let quarter = half * 0.5;
             let early = cell.value(walker.fraction(simd, walker.depth + quarter));
             let late = cell.value(walker.fraction(simd, end - quarter));
             near = Pair::new(simd, table, from, balanced(first, early, middle), middle, quarter);
             let pair = Pair::new(simd, table, near.end, balanced(middle, late, last), last, quarter);
-            exact |= lanes & (pair.doubt() * light.transmittance).simd_gt(MAX_DOUBT);
+            color_doubt = pair.doubt();
+            doubt *= 0.25;
             from = pair.end;
             far = Some(pair.pieces);
         } else {
             near = Pair::new(simd, table, from, balanced(first, middle, last), last, half);
             from = near.end;
         }
-        exact |= lanes & (near.doubt() * light.transmittance).simd_gt(MAX_DOUBT);
+        let behind = light.transmittance;
+        color_doubt = (color_doubt + near.doubt()) * behind;
+        exact |= lanes & color_doubt.simd_gt(MAX_DOUBT);
+        let read = lanes & !exact;
+        light.doubt += read.select(doubt + color_doubt, zero);
+        light.table_way += read.select(behind * (half + half), zero);
         if exact.any_true() {
             let [from, to] = [walker.depth, end].map(
                 #[inline(always)]
                 |depth| walker.fraction(simd, depth),
             );
             add_cells(simd, table.bands, &cell.along(from, to), half + half, exact, light);
+            light.doubt += (behind - light.transmittance) * EXACT_DOUBT;
         }
-        light.add(simd, &near.pieces, lanes & !exact);
+        light.add(simd, &near.pieces, read);
         if let Some(pieces) = far {
-            light.add(simd, &pieces, lanes & !exact);
+            light.add(simd, &pieces, read);
         }
         first = last;
         // Who was blank finds its value again.

@@ -29,6 +29,7 @@ pub mod histogram;
 pub mod info;
 mod input;
 pub mod output;
+mod ray_budget;
 pub mod report;
 mod session;
 mod stack_session;

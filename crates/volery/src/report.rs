@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use volery_frame::{Device, DeviceKind};
 
+pub use crate::ray_budget::RayBudget;
+
 /// Everything about one picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
@@ -146,9 +148,16 @@ pub struct Dial {
 /// Distance from the truth, of colour channels in [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Error {
-    /// No channel of any pixel differs by more from the picture of the full resolution; computed without it.
+    /// No channel of any pixel differs by more from the picture of the full resolution; computed without it. What
+    /// separates that picture from the truth (rounding to texels, and of `f32`) comes on top.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound_max: Option<f64>,
+    /// What `bound_max` is against.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound_against: Option<&'static str>,
+    /// Of rays: what each stage may add to the distance from the exact picture of the field that is drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<RayBudget>,
     /// What was found by comparing pictures.
     #[serde(flatten)]
     pub measured: Option<Measured>,
@@ -164,7 +173,7 @@ pub struct Measured {
     /// The same in decibels; missing where pictures are equal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured_psnr_db: Option<f64>,
-    /// What the truth was.
+    /// What the truth was, for the measured numbers.
     pub against: &'static str,
 }
 

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use volery_frame::{
-    Backend, Content, Cubes, Frame, Image, Planes, PointTransfer, RayTransfer, Rays, Thickness,
+    Backend, Content, Cubes, Drawn, Frame, Image, Planes, PointTransfer, RayTransfer, Rays, Thickness,
     VolumeLayout,
 };
 use volery_pyramid::{CubeTree, Kind, Node, NodeSource, Pyramid};
@@ -238,25 +238,43 @@ impl Session {
         let mut last = None;
         for _ in 0..num_frames {
             let start = Instant::now();
+            self.suit(&view.transfer)?;
             let plan = self.plan(view);
             let select = start.elapsed().as_secs_f64();
             let start = Instant::now();
             uploaded += self.upload(plan.nodes())?;
             let upload = start.elapsed().as_secs_f64();
             let start = Instant::now();
-            let image = self.draw(view, &plan)?;
+            let drawn = self.draw(view, &plan)?;
             let draw = start.elapsed().as_secs_f64();
             times.push(Times { select, geometry: None, upload: Some(upload), draw });
-            last = Some((image, plan));
+            last = Some((drawn, plan));
         }
-        let (image, plan) = last.ok_or(RenderError::NoFrame)?;
-        let report = self.report(view, &plan, uploaded, &times);
-        Ok(Picture { image, report })
+        let (drawn, plan) = last.ok_or(RenderError::NoFrame)?;
+        let report = self.report(view, (&plan, drawn.ray_doubt), uploaded, &times);
+        Ok(Picture { image: drawn.image, report })
     }
 
     fn check(&self, view: &View) -> Result<(), RenderError> {
         view.check()?;
         if self.technique == Technique::Plane { view.planes.check() } else { Ok(()) }
+    }
+
+    /// Has samples encoded as a transfer function asks. Where that changes, no brick stays resident.
+    fn suit(&mut self, transfer: &TransferFunction) -> Result<(), RenderError> {
+        // Cubes are no texels of a backend's.
+        if self.technique == Technique::Fans {
+            return Ok(());
+        }
+        let encoding = self.encoding.suiting(transfer, self.volume.value_range);
+        if encoding != self.encoding {
+            self.encoding = encoding;
+            self.volume =
+                VolumeLayout { value_scale: encoding.scale, value_offset: encoding.offset, ..self.volume };
+            self.transfer = None;
+            self.backend.set_volume(&self.volume).map_err(residency::Error::from)?;
+        }
+        Ok(())
     }
 
     /// Chooses what to draw; integrates the transfer function where that is needed and it is another one.
@@ -293,7 +311,7 @@ impl Session {
         Ok(residency::upload(&self.source, &self.encoding, &self.volume, nodes, backend)?)
     }
 
-    fn draw(&mut self, view: &View, plan: &Plan) -> Result<Image, RenderError> {
+    fn draw(&mut self, view: &View, plan: &Plan) -> Result<Drawn, RenderError> {
         let point_transfer;
         let content = match plan {
             Plan::Rays(plan) => {
@@ -321,7 +339,7 @@ impl Session {
             meshes: &view.meshes,
             content,
         };
-        Ok(self.backend.draw(&frame)?.image)
+        Ok(self.backend.draw(&frame)?)
     }
 
     /// Compares a picture of this volume with the truth: the exact picture in `f64` of the full-resolution

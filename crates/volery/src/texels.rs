@@ -5,14 +5,23 @@
 //! | u8, i8 | U8 | none |
 //! | u16, i16 | U16 | none |
 //! | RGB, RGBA | Rgba8, opaque where there is no fourth channel | none |
-//! | u32, i32, f32, f64 | F32, 0 at the smallest finite value and 1 at the largest | at most 2^-25 of the range |
+//! | u32, i32, f32, f64 | F32, from 0 to 1 over a window of values | at most 2^-25 of the window in it, 2^-24 of the distance from its start beyond |
 //!
-//! Relative to the range, since `f32` texels near 1e6 would leave nothing of a range of 1. A sample that is
-//! blank (NaN or infinite) becomes NaN.
+//! Relative to a window, since `f32` texels near 1e6 would leave nothing of a range of 1. The window is the range of
+//! finite values, or that part of it in which the transfer function changes where this is much smaller: one outlier, or
+//! a fill value of 1e20, would else take the digits of all other samples. Beyond [`FARTHEST`] windows samples count as
+//! that far: in the cell of such a sample the window is passed within a millionth of a millionth of its length. A sample
+//! that is blank (NaN or infinite) becomes NaN.
 
 use volery_frame::{TexelType, Texels};
 use volery_pyramid::{BrickSamples, for_brick_samples};
-use volery_scene::{Sample, SampleType};
+use volery_scene::{Sample, SampleType, TransferFunction};
+
+/// The farthest that a finite sample is from the window, in windows.
+const FARTHEST: f64 = 1e12;
+
+/// A window of values is good enough for another that is smaller by no more than this factor.
+const MAX_WINDOW: f64 = 8.0;
 
 /// How samples of one volume become texels: `value = offset + scale * texel`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +47,19 @@ impl Encoding {
             }
             SampleType::Rgb8 | SampleType::Rgba8 => integers(TexelType::Rgba8, 0.0),
         }
+    }
+
+    /// The encoding that suits a transfer function: this one where its digits are enough, else one for the values at
+    /// which colour or opacity change. `range` is that of the volume.
+    pub(crate) fn suiting(&self, transfer: &TransferFunction, range: [f64; 2]) -> Self {
+        let points = transfer.points();
+        let [low, high] = [points[0].value, points[points.len() - 1].value].map(|x| x.clamp(range[0], range[1]));
+        let width = high - low;
+        let reach = (low - self.offset).abs().max((high - self.offset).abs());
+        if self.texel != TexelType::F32 || width <= 0.0 || reach.max(self.scale) <= MAX_WINDOW * width {
+            return *self;
+        }
+        Self { texel: self.texel, scale: width, offset: low }
     }
 
     /// From the smallest to the largest value that texels can stand for.
@@ -70,9 +92,10 @@ impl Encoding {
         }
     }
 
-    /// Where a value stands in the range, 0 to 1; NaN if it is blank.
+    /// Where a value stands in the window, 0 to 1 in it; NaN if it is blank.
     fn relative(&self, value: f64) -> f32 {
-        if value.is_finite() { ((value - self.offset) / self.scale) as f32 } else { f32::NAN }
+        let texel = (value - self.offset) / self.scale;
+        if value.is_finite() { texel.clamp(-FARTHEST, FARTHEST) as f32 } else { f32::NAN }
     }
 }
 

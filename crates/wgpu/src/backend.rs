@@ -154,11 +154,13 @@ impl WgpuBackend {
             raycast.bind(gpu, &Resources { units, atlas, transfer, bands, picture, surfaces })
         };
         let passes = (raycast::TILE, &surfaces);
-        draw_in_bands(gpu, &mut self.band, size, passes, bind, |pass, bound, rows| {
+        raycast.reset_doubt(gpu);
+        let drawn = draw_in_bands(gpu, &mut self.band, size, passes, bind, |pass, bound, rows| {
             (shader_frame.first_row, shader_frame.end_row) = (rows.start, rows.end);
             raycast.set_frame(gpu, &shader_frame);
             Raycast::encode(pass, &pipeline, bound, &shader_frame);
-        })
+        })?;
+        Ok(Drawn { ray_doubt: Some(raycast.doubt(gpu)?), ..drawn })
     }
 
     fn draw_planes(&mut self, frame: &Frame<'_>, planes: &Planes<'_>) -> Result<Drawn, Failure> {
@@ -249,5 +251,5 @@ impl Backend for WgpuBackend {
 fn background(frame: &Frame<'_>) -> Drawn {
     let (width, height) = (frame.width, frame.height);
     let pixels = vec![frame.background; width as usize * height as usize];
-    Drawn { image: Image { width, height, pixels }, device_seconds: None }
+    Drawn { image: Image { width, height, pixels }, device_seconds: None, ray_doubt: None }
 }

@@ -126,7 +126,7 @@ pub(crate) fn draw_bands_in_passes<B>(
         seconds = seconds.zip(run).map(|(sum, run)| sum + run);
     }
     *kept = Some(band);
-    Ok(Drawn { image: Image { width, height, pixels }, device_seconds: seconds })
+    Ok(Drawn { image: Image { width, height, pixels }, device_seconds: seconds, ray_doubt: None })
 }
 
 impl Band {

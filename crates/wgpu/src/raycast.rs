@@ -2,12 +2,15 @@
 
 use std::collections::HashMap;
 
-use volery_frame::{RayTransfer, TexelType, VolumeLayout};
+use volery_frame::{RayDoubt, RayTransfer, TexelType, VolumeLayout};
 use volery_shaders::{Binding, raycast};
 
 use crate::bindings::{bind_group_layout, buffer};
 use crate::gpu::{Failure, Gpu};
 use crate::units::Units;
+
+/// Bytes of two numbers.
+const WORST_BYTES: u64 = 8;
 
 /// The pipeline in its forms.
 pub(crate) struct Raycast {
@@ -17,6 +20,8 @@ pub(crate) struct Raycast {
     pipelines: HashMap<Form, wgpu::ComputePipeline>,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
+    /// The two numbers of a [`RayDoubt`], and where they are read.
+    worst: [wgpu::Buffer; 2],
 }
 
 /// What a frame asks of the pipeline: a form does not pay for what it need not do.
@@ -51,6 +56,14 @@ impl Raycast {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Failure> {
         gpu.checked(|| {
             let device = &gpu.device;
+            let empty = |label, size, usage| {
+                device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some(label),
+                    size,
+                    usage: usage | wgpu::BufferUsages::COPY_DST,
+                    mapped_at_creation: false,
+                })
+            };
             let layout = bind_group_layout(device, "volery raycast", raycast::BINDINGS);
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(raycast::LABEL),
@@ -58,12 +71,11 @@ impl Raycast {
             });
             Self {
                 pipelines: HashMap::new(),
-                frame: device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("volery frame"),
-                    size: size_of::<raycast::Frame>() as u64,
-                    usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                    mapped_at_creation: false,
-                }),
+                frame: empty("volery frame", size_of::<raycast::Frame>() as u64, wgpu::BufferUsages::UNIFORM),
+                worst: [
+                    empty("volery doubt", WORST_BYTES, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC),
+                    empty("volery doubt staging", WORST_BYTES, wgpu::BufferUsages::MAP_READ),
+                ],
                 sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                     label: Some("volery atlas"),
                     ..Default::default()
@@ -88,6 +100,7 @@ impl Raycast {
             "atlas" => wgpu::BindingResource::TextureView(&atlas),
             "atlas_sampler" => wgpu::BindingResource::Sampler(&self.sampler),
             "transfer" => wgpu::BindingResource::TextureView(&transfer),
+            "worst" => self.worst[0].as_entire_binding(),
             "bands" => resources.bands.as_entire_binding(),
             "surfaces" => wgpu::BindingResource::TextureView(resources.surfaces),
             // A binding that the shader gains and this does not know fails as one of the wrong kind.
@@ -107,6 +120,30 @@ impl Raycast {
     /// Hands the frame to the device, for the commands that come next.
     pub(crate) fn set_frame(&self, gpu: &Gpu, frame: &raycast::Frame) {
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
+    }
+
+    /// Forgets the doubt of the picture before, for the commands that come next.
+    pub(crate) fn reset_doubt(&self, gpu: &Gpu) {
+        gpu.queue.write_buffer(&self.worst[0], 0, &[0; WORST_BYTES as usize]);
+    }
+
+    /// What the rays since [`Raycast::reset_doubt`] may be off by.
+    pub(crate) fn doubt(&self, gpu: &Gpu) -> Result<RayDoubt, Failure> {
+        let [worst, staging] = &self.worst;
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("volery doubt") };
+        gpu.checked(|| {
+            let mut encoder = gpu.device.create_command_encoder(&descriptor);
+            encoder.copy_buffer_to_buffer(worst, 0, staging, 0, WORST_BYTES);
+            gpu.queue.submit([encoder.finish()]);
+            staging.map_async(wgpu::MapMode::Read, .., |_| ());
+            gpu.wait()
+        })??;
+        let view = staging.get_mapped_range(..).map_err(|e| Failure::Other(e.to_string()))?;
+        let [cells, table_way] = [0, 4].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
+        drop(view);
+        staging.unmap();
+        // Ways are depths to the base 2.
+        Ok(RayDoubt { cells, table_way: table_way * std::f32::consts::LN_2 })
     }
 
     /// The pipeline of one form, compiled if this is the first frame that needs it.

@@ -74,6 +74,8 @@ const INVISIBLE: f32 = 1e-30;
 // The largest doubt of a stretch of ray, as a difference of a colour channel: beyond, it is halved, and where that
 // cannot be enough integrated exactly.
 const MAX_DOUBT: f32 = 0.003;
+// What a channel may be off by where a cell was integrated exactly, as a share of the light that it takes.
+const EXACT_DOUBT: f32 = 0.0025;
 // Longer than any ray.
 const FAR: f32 = 1e30;
 // Pixels per edge of a workgroup's tile.
@@ -107,6 +109,9 @@ const CELLS_MASK: u32 = 1023;
 // [blue, red slope, green slope, blue slope]. A texel's place in one is its distance u from the base; it holds those
 // from low to high. Opacity is per unit distance, clearness what is missing to 1; slopes are per texel.
 @group(0) @binding(7) var<storage, read> bands: array<vec4f>;
+// The largest doubt of any ray, and the longest way through cells that were read from the table: bits of numbers of at
+// least 0, which are in order as the numbers are.
+@group(0) @binding(8) var<storage, read_write> worst: array<atomic<u32>>;
 
 struct Ray {
     start: vec3f,
@@ -125,6 +130,10 @@ struct Light {
     color: vec3f,
     depth: f32,
     transmittance: f32,
+    // What a channel may be off by, but for the arithmetic; and the way through cells that were read from the table, as
+    // depth to the base 2 of matter that has depth 1 per unit length, as it is seen.
+    doubt: f32,
+    table_way: f32,
 }
 
 // One end of a piece of ray: the texel, its bin, and the antiderivatives there.
@@ -159,10 +168,14 @@ fn largest(v: vec3f) -> f32 {
 
 fn ray_of_pixel(pixel: vec2u) -> Ray {
     let at = vec2f(pixel) + 0.5;
-    let start = frame.origin + at.x * frame.origin_dx + at.y * frame.origin_dy;
     let way = frame.toward + at.x * frame.toward_dx + at.y * frame.toward_dy;
     let toward = normalize(way);
     let rising = toward >= vec3f(0.0);
+    // The volume is closed: rays in its faces, but for rounding, run inside of it.
+    let place = frame.origin + at.x * frame.origin_dx + at.y * frame.origin_dy;
+    let inside = clamp(place, vec3f(0.0), frame.cells * 0.9999999);
+    let is_in_face = (abs(toward) < vec3f(1e-12)) & (abs(place - inside) <= 1e-6 * frame.cells);
+    let start = select(place, inside, is_in_face);
     // No component is zero, so that no face is infinitely far or NaN away.
     let direction = select(min(toward, vec3f(-1e-12)), max(toward, vec3f(1e-12)), rising);
     let depth_per_t = length(direction * frame.depth_per_cell);
@@ -501,14 +514,14 @@ fn add_exactly(light: ptr<function, Light>, whole: vec4f, length: f32) {
 //
 // One loop, each round of which leaves one box: a cell of a brick, or a cube of empty units. Nested loops would
 // make the rays of a SIMD group wait for one another at the end of each inner one.
-fn light_along(ray: Ray) -> vec3f {
+fn light_along(ray: Ray) -> Light {
     let first_faces = (mix(frame.cells, vec3f(0.0), ray.rising) - ray.start) * ray.inverse;
     let last_faces = (mix(vec3f(0.0), frame.cells, ray.rising) - ray.start) * ray.inverse;
     var t = max(largest(first_faces), 0.0);
     let t_end = min(smallest(last_faces), ray.end);
     // The finest cell that the ray is in.
     var place = clamp(floor(ray.start + t * ray.direction), vec3f(0.0), frame.cells - 1.0);
-    var light = Light(vec3f(0.0), 0.0, 1.0);
+    var light = Light(vec3f(0.0), 0.0, 1.0, 0.0, 0.0);
     // The texel at t, where the cell before was of the same level; its level, or none.
     var end = End(0.0, 0.0, vec4f(0.0));
     var end_level = NO_LEVEL;
@@ -563,12 +576,16 @@ fn light_along(ray: Ray) -> vec3f {
         let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);
         let a = piece_to(end, balanced(end.texel, middle, last), depth);
         let b = piece_to(a.end, last, depth);
-        is_exact = is_exact || doubt_of_color(a, b) * light_behind > MAX_DOUBT;
+        let color_doubt = doubt_of_color(a, b) * light_behind;
+        is_exact = is_exact || color_doubt > MAX_DOUBT;
         if is_exact {
             let enter = (origin + t * ray.direction) * inverse_scale;
             let length = (t_next - t) * ray.depth_per_t * frame.depth_scale;
             add_exactly(&light, cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.direction), length);
+            light.doubt += EXACT_DOUBT * (light_behind - light.transmittance);
         } else {
+            light.doubt += color_doubt + select(doubt, 0.125 * doubt, is_halved);
+            light.table_way += 2.0 * depth * light_behind;
             add_pair(&light, a, b);
         }
         end = b.end;
@@ -579,7 +596,8 @@ fn light_along(ray: Ray) -> vec3f {
         place = select(select(inside, beyond, faces <= vec3f(t_next)), place, vec3<bool>(is_start));
         t = t_next;
     }
-    return light.color + light.transmittance * ray.behind;
+    light.color += light.transmittance * ray.behind;
+    return light;
 }
 
 // Pixels of a tile in an order that keeps neighbours in one SIMD group of 8 or more.
@@ -595,7 +613,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     if pixel.x >= frame.width || pixel.y >= frame.end_row {
         return;
     }
-    let color = light_along(ray_of_pixel(pixel));
+    let light = light_along(ray_of_pixel(pixel));
+    let color = light.color;
+    atomicMax(&worst[0], bitcast<u32>(light.doubt));
+    atomicMax(&worst[1], bitcast<u32>(light.table_way));
     let index = 3u * ((pixel.y - frame.first_row) * frame.width + pixel.x);
     picture[index] = color.r;
     picture[index + 1u] = color.g;

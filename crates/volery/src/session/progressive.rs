@@ -111,11 +111,11 @@ impl Progressive<'_> {
         // Where the backend's memory was full, it may have forgotten what is shown.
         let mut uploaded = uploaded;
         uploaded += self.session.upload(plan.nodes())?;
-        let image = self.session.draw(&self.view, &plan)?;
+        let drawn = self.session.draw(&self.view, &plan)?;
         let draw = start.elapsed().as_secs_f64();
         let times = Times { select, geometry: None, upload: Some(upload), draw };
-        let report = self.session.report(&self.view, &plan, uploaded, &[times]);
-        Ok(Step { picture: Picture { image, report }, is_last })
+        let report = self.session.report(&self.view, (&plan, drawn.ray_doubt), uploaded, &[times]);
+        Ok(Step { picture: Picture { image: drawn.image, report }, is_last })
     }
 
     /// Makes bricks resident that are at hand, or waits for the most wanted one.

@@ -1,11 +1,20 @@
 //! From what was done to the report of it.
 
+use volery_frame::RayDoubt;
+
 use super::{Plan, Session, Times, View};
+use crate::ray_budget::RayBudget;
 use crate::report::{self, Report};
 use crate::technique::residency::Uploaded;
 
 impl Session {
-    pub(super) fn report(&self, view: &View, plan: &Plan, uploaded: Uploaded, times: &[Times]) -> Report {
+    pub(super) fn report(
+        &self,
+        view: &View,
+        (plan, ray_doubt): (&Plan, Option<RayDoubt>),
+        uploaded: Uploaded,
+        times: &[Times],
+    ) -> Report {
         let dims = self.grid.dims();
         let planes = match plan {
             Plan::Rays(_) | Plan::Cubes(_) => None,
@@ -46,7 +55,23 @@ impl Session {
                 },
             },
             dial: (dial != report::Dial::default()).then_some(dial),
-            error: planes.map(|plan| report::Error { bound_max: Some(plan.bound_max), measured: None }),
+            error: self.error(plan, ray_doubt),
+        }
+    }
+
+    /// What is known of the error without the truth.
+    fn error(&self, plan: &Plan, ray_doubt: Option<RayDoubt>) -> Option<report::Error> {
+        let none = report::Error::default();
+        match (plan, &self.transfer, ray_doubt) {
+            (Plan::Planes(plan), ..) => Some(report::Error {
+                bound_max: Some(plan.bound_max),
+                bound_against: Some("full resolution"),
+                ..none
+            }),
+            (Plan::Rays(_), Some((_, transfer)), Some(doubt)) => {
+                Some(report::Error { budget: Some(RayBudget::new(transfer, &self.volume, doubt)), ..none })
+            }
+            _ => None,
         }
     }
 }
