@@ -5,6 +5,7 @@
 mod against_marching;
 mod cells;
 mod closed_forms;
+mod collapsed;
 mod grids;
 mod planes;
 mod requests;
