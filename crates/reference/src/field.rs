@@ -4,6 +4,10 @@ use std::ops::ControlFlow;
 
 use crate::transfer::{Bands, Place};
 
+/// What the difference of two places where a field has given values may be off by, at most, unless the field is all but
+/// flat at one of them: then it is no better known than it is.
+const PLACE_ROUNDING: f64 = 1e-12;
+
 /// A polynomial field of degree `N` on the unit interval, by how far it is above some base.
 pub(crate) trait Field<const N: usize> {
     /// Its value.
@@ -109,8 +113,8 @@ impl<const N: usize> Rise<N> {
                 (value * width + coefficient, slope * width + value)
             });
             let step = (value * width - rise) / (value + slope * width);
-            // More is not the rounding of places; where the field turns, the difference is the better one.
-            if step.abs() <= 2.0 * f64::EPSILON && width - step > 0.0 {
+            // More is not the rounding of places.
+            if step.abs() <= PLACE_ROUNDING && width - step > 0.0 {
                 width -= step;
             }
         }

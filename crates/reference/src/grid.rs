@@ -14,9 +14,10 @@
 //!
 //! # The error
 //! A pixel is within 1e-6 of the exact integral for the rules below; tests find 1e-12 on linear and on voxel fields and
-//! ask for 1e-8 on cells with curved coordinates. A field that is replaced keeps [`FIT_TOLERANCE`] except where local
-//! coordinates are singular, at the edge of a collapsed cell: there halving ends after a 4,096th of the stretch. Where a
-//! ray only just touches the value of a step of the transfer function, the error of the field counts with its root.
+//! ask for 1e-8 on cells with curved coordinates, and 1e-7 on cells whose nodes are one in every way that leaves them a
+//! volume. A field that is replaced keeps [`FIT_TOLERANCE`] except where local coordinates are singular, at the edge of
+//! a collapsed cell: there halving ends after a 4,096th of the stretch. Where a ray only just touches the value of a
+//! step of the transfer function, the error of the field counts with its root.
 //!
 //! # Rules where a grid leaves open what is true
 //! - A face of four nodes is two triangles, split at its node of the lowest number.
@@ -225,7 +226,8 @@ impl<'a> GridTracer<'a> {
         if values.iter().all(|value| *value == values[0]) {
             return add_constant(light, &self.bands.at(0.0, values[0]), length);
         }
-        let integrator = Integrator { bands: &self.bands, tolerance: TOLERANCE };
+        let is_sliver = ends[1] - ends[0] <= CLOSED * self.boxes.reach();
+        let integrator = Integrator { bands: &self.bands, tolerance: TOLERANCE, is_sliver };
         let base = seen.value_next_to(ends[0] / 2.0 + ends[1] / 2.0);
         let course = Course::new(&seen, stretch, base);
         if !course.fit(ends, self.fit_tolerance(values, base), fits) {
@@ -244,7 +246,8 @@ impl<'a> GridTracer<'a> {
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         // Beside a step of the transfer function it is the place of the step that counts.
-        let near = if self.bands.edges_between(low, high, 0.0).is_empty() { f64::INFINITY } else { high - low };
+        let near =
+            if self.bands.edges_between(low, high, 0.0).is_empty() { f64::INFINITY } else { high - low };
         let scale = self.bands.of_range(low, high).iter().map(Band::width).fold(near, f64::min);
         (FIT_TOLERANCE * scale).max(ROUNDING * (low - base).abs().max((high - base).abs()))
     }

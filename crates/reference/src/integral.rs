@@ -13,8 +13,8 @@
 //! - *Poles*: where opacity reaches 1 at a point, extinction has a logarithmic pole. Halving grades the
 //!   intervals towards it; one of length `h` holds an optical depth of order `h ln h`, so it ends.
 //!
-//! It ends always: after [`MAX_HALVINGS`] an interval is shorter than the spacing of `f64` in a cell, and the
-//! field itself is not known better.
+//! It ends always, and soon: in a piece the field counts from its start, so that what is rounded is a part of the
+//! band's width, and intervals agree to that. After [`MAX_HALVINGS`] one is shorter than the spacing of `f64`.
 
 use std::ops::ControlFlow;
 
@@ -149,6 +149,9 @@ pub(crate) struct Integrator<'a> {
     pub(crate) bands: &'a Bands,
     /// Largest estimated error of one interval.
     pub(crate) tolerance: f64,
+    /// Whether the way may be no more than rounding, as between two faces where a ray passes an edge of cells: a value
+    /// of opacity 1 is then one that it is near to, not one that it keeps.
+    pub(crate) is_sliver: bool,
 }
 
 impl Integrator<'_> {
@@ -165,7 +168,14 @@ impl Integrator<'_> {
         let length = length.min(LONGEST);
         let [low, high] = field.range();
         if high - low <= ROUNDING * low.abs().max(high.abs()) {
-            return add_constant(front, &self.bands.at(low, base), length);
+            let place = self.bands.at(low, base);
+            if self.is_sliver {
+                let (color, extinction) = place.classify();
+                *front = front.then(&homogeneous(color, extinction * length));
+            } else {
+                add_constant(front, &place, length);
+            }
+            return;
         }
         let _ = field.pieces(self.bands, base, |piece| {
             self.add_piece(front, &piece, length);
@@ -301,7 +311,8 @@ mod tests {
         let bands = Bands::new(&TransferFunction::new(points.to_vec(), 1.0).unwrap());
         let field = Cubic::new([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]);
         let mut light = Light::CLEAR;
-        Integrator { bands: &bands, tolerance: PIECE_TOLERANCE }.add(&mut light, &field, 0.0, length);
+        Integrator { bands: &bands, tolerance: PIECE_TOLERANCE, is_sliver: false }
+            .add(&mut light, &field, 0.0, length);
         light
     }
 

@@ -2,6 +2,8 @@
 //!
 //! A ray meets a plane at `t = (distance - normal · origin) / (normal · direction)`, in `f64`. There the field is
 //! trilinear (or the nearest sample), and the transfer function gives colour and opacity, with no length involved.
+//! The field counts from the nearest sample, so between equal samples it has their value to the last bit, which may be
+//! that of a step.
 //! Planes are composed front to back along each ray, so that those which cut one another hide one another right;
 //! at equal distance the one listed first is in front.
 
@@ -15,9 +17,9 @@ use crate::render::{Error, picture};
 use crate::surfaces::Backdrop;
 use crate::transfer::Bands;
 
-/// Distance beyond the domain's faces, relative to the reach of the scene, that counts as on them: a plane that
-/// coincides with a face is seen in spite of rounding.
-const FACE_SLACK: f64 = 1e-12;
+/// Distance from a layer of samples, relative to the reach of the domain, that counts as in it: a plane that coincides
+/// with a face is seen in spite of rounding.
+const LAYER_SLACK: f64 = 1e-12;
 
 /// How near to the middle between two samples, in units of samples, a place is in the middle: the upper one counts
 /// there. The middle plane of an even number of samples is such a place, in spite of rounding.
@@ -105,11 +107,12 @@ impl PlaneScene<'_> {
     }
 
     /// A place in units of samples; `None` outside the domain. Within rounding of a layer of samples it is in the
-    /// layer: of a plane that coincides with one, the layer is seen, and nothing between it and the next.
+    /// layer: of a plane that coincides with one, the layer is seen, not a mixture with the next.
     fn in_samples(&self, place: DVec3) -> Option<DVec3> {
         let spacing = self.grid.spacing();
         let last = DVec3::from_array(self.grid.dims().map(|n| (n - 1) as f64));
-        let slack = (place.abs().max_element().max(self.grid.extent().max_element()) / spacing * FACE_SLACK).min(DVec3::splat(0.5));
+        let slack = (place.abs().max_element().max(self.grid.extent().max_element()) / spacing * LAYER_SLACK)
+            .min(DVec3::splat(0.5));
         let place = place / spacing;
         let layer = place.round();
         let place = DVec3::select((place - layer).abs().cmple(slack), layer, place);
@@ -122,11 +125,7 @@ impl PlaneScene<'_> {
     }
 
     /// Colour and opacity where each channel's field is as far above a base as said.
-    fn look(
-        &self,
-        bands: &Bands,
-        field: impl Fn(usize) -> Option<(f64, f64)>,
-    ) -> Option<([f64; 3], f64)> {
+    fn look(&self, bands: &Bands, field: impl Fn(usize) -> Option<(f64, f64)>) -> Option<([f64; 3], f64)> {
         let unit = |channel: usize| field(channel).map(|(base, above)| (base + above) / 255.0);
         match self.grid.sample_type() {
             SampleType::Rgb8 => Some(([unit(0)?, unit(1)?, unit(2)?], 1.0)),

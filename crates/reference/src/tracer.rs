@@ -17,6 +17,9 @@ use crate::transfer::{Band, Bands};
 /// Cells per axis of a block that is skipped as one.
 const BLOCK: usize = 8;
 
+/// Ways through a cell, in units of samples, that may be no more than the rounding of the places where they end.
+const SLIVER: f64 = 1e-12;
+
 /// Rounding of distances to the domain, relative to them.
 const FAR_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
@@ -225,14 +228,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Adds the light of one cell, which the ray crosses from `t[0]` to `t[1]`.
-    fn cross<T: Sample>(
-        &self,
-        values: &[T],
-        way: &Way,
-        cell: [usize; 3],
-        t: [f64; 2],
-        light: &mut Light,
-    ) {
+    fn cross<T: Sample>(&self, values: &[T], way: &Way, cell: [usize; 3], t: [f64; 2], light: &mut Light) {
         let corners = corners(values, self.grid, cell);
         // A blank cell holds no matter.
         let Some([low, high]) = cell::range(&corners) else { return };
@@ -249,7 +245,9 @@ impl<'a> Tracer<'a> {
         let [enter, exit] = t.map(local);
         let base = cell::base(&corners, enter, exit);
         let field = cell::along(&corners, base, enter, exit);
-        Integrator { bands: &self.bands, tolerance: self.tolerance }.add(light, &field, base, length);
+        let is_sliver = (exit - enter).abs().max_element() <= SLIVER;
+        let integrator = Integrator { bands: &self.bands, tolerance: self.tolerance, is_sliver };
+        integrator.add(light, &field, base, length);
     }
 }
 
@@ -294,4 +292,45 @@ fn blocks_with_matter<T: Sample>(
         range[0] <= range[1] && !bands.of_range(range[0], range[1]).iter().all(Band::is_clear)
     };
     (0..num_blocks.iter().product()).into_par_iter().map(holds_matter).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integral::NUM_INTERVALS;
+    use volery_scene::ControlPoint;
+
+    /// Intervals for rays all over noise between `offset` and `offset + span`.
+    fn work(offset: f64, span: f64) -> u64 {
+        let values: Vec<f64> = (0..512)
+            .map(|i| offset + span * ((volery_data::hash(i) >> 11) as f64 / (1u64 << 53) as f64))
+            .collect();
+        let grid = VoxelGrid::new([8; 3], DVec3::ONE, values).unwrap();
+        let points = [(0.1, 0.0), (0.5, 0.1), (0.5, 0.3), (0.7, 1.0), (0.995, 0.4)]
+            .map(|(w, opacity)| ControlPoint { value: offset + span * w, color: [w, 1.0 - w, 0.5], opacity });
+        let transfer = TransferFunction::new(points.to_vec(), 40.0).unwrap();
+        let tracer = Tracer::new(&grid, &transfer).unwrap();
+        NUM_INTERVALS.set(0);
+        for i in 0..256 {
+            let origin = DVec3::new(f64::from(i % 16) * 0.45, f64::from(i / 16) * 0.45, -9.0);
+            tracer.trace(&Ray { origin, direction: DVec3::new(0.1, 0.03, 1.0).normalize() });
+        }
+        NUM_INTERVALS.get()
+    }
+
+    #[test]
+    fn an_offset_costs_no_more_intervals_however_large() {
+        let twin = work(0.0, 1.0);
+        assert!(twin > 10_000, "{twin} intervals");
+        for (offset, span) in
+            [(1e6, 1e-2), (1e6, 1e-3), (1e9, 1.0), (4e9, 200.0), (-1e9, 1.0), (1e12, 1.0), (1e15, 100.0)]
+        {
+            let shifted = work(offset, span);
+            println!("{offset:e} + [0, {span:e}]: {shifted} intervals, {twin} without offset");
+            assert!(
+                shifted * 2 <= twin * 3,
+                "{offset:e} + [0, {span:e}]: {shifted} intervals, {twin} without"
+            );
+        }
+    }
 }

@@ -104,7 +104,12 @@ impl Collapsed {
                 break;
             }
         }
-        assert!(best.0 < 0.3, "{:?} {:?}: no local coordinates of {place}: {best:?}", self.cell_type, self.nodes);
+        assert!(
+            best.0 < 0.3,
+            "{:?} {:?}: no local coordinates of {place}: {best:?}",
+            self.cell_type,
+            self.nodes
+        );
         guess.set(best.1);
         best.1
     }
@@ -169,7 +174,8 @@ fn collapsed(cell_type: CellType, random: &mut Random) -> Vec<Collapsed> {
         }
         patterns.insert(nodes);
     }
-    let turned = DMat3::from_cols(DVec3::new(1.1, 0.2, -0.1), DVec3::new(0.1, 0.9, 0.3), DVec3::new(-0.2, 0.1, 1.2));
+    let turned =
+        DMat3::from_cols(DVec3::new(1.1, 0.2, -0.1), DVec3::new(0.1, 0.9, 0.3), DVec3::new(-0.2, 0.1, 1.2));
     let straight = straight(cell_type);
     let cells = patterns.into_iter().map(|pattern| {
         let same = |node: u8| (0..count).filter(|&i| pattern[i] == node).collect::<Vec<_>>();
@@ -189,7 +195,8 @@ fn collapsed(cell_type: CellType, random: &mut Random) -> Vec<Collapsed> {
 }
 
 fn grid(cell: &Collapsed) -> UnstructuredGrid {
-    let cells = Cells::new(vec![cell.cell_type], cell.nodes.clone()).expect("as many nodes as the type asks for");
+    let cells =
+        Cells::new(vec![cell.cell_type], cell.nodes.clone()).expect("as many nodes as the type asks for");
     UnstructuredGrid::new(cell.places.clone(), cells).expect("nodes that exist")
 }
 
@@ -236,7 +243,8 @@ fn worst(cell: &Collapsed, random: &mut Random) -> (f64, usize) {
 #[test]
 fn cells_collapsed_in_every_way_have_the_field_of_their_interpolation() {
     let mut random = Random::new(40);
-    for (cell_type, at_least) in [(CellType::Pyramid, 5), (CellType::Wedge, 15), (CellType::Hexahedron, 150)] {
+    for (cell_type, at_least) in [(CellType::Pyramid, 5), (CellType::Wedge, 15), (CellType::Hexahedron, 150)]
+    {
         let cells = collapsed(cell_type, &mut random);
         let (mut greatest, mut num_lit) = (0.0, 0);
         for cell in &cells {

@@ -111,10 +111,10 @@ fn no_ray_is_lost_or_counted_twice_at_faces_edges_and_nodes() {
 /// Rays in the faces and edges of the domain, along an axis, aslant, and diagonally: in voxels and in cells.
 #[test]
 fn the_domain_is_closed() {
-    let matter = wild(0.8);
     let dims = BOXES.map(|n| n + 1);
     let ends = |axis: usize| [0.0, EXTENT[axis] * 0.4, EXTENT[axis]];
     for spacing in [DVec3::ONE, DVec3::new(0.1, 0.3, 0.7)] {
+        let matter = wild(0.8 * spacing.min_element());
         for filling in FILLINGS {
             let straight = lattice(BOXES, filling, |p| p * spacing);
             let field = |p: DVec3| 0.02 + DVec3::new(0.2, 0.11, 0.06).dot(p / spacing);
@@ -134,7 +134,8 @@ fn the_domain_is_closed() {
                         let mut direction = DVec3::AXES[axis];
                         direction[v] = slope;
                         origin[v] -= slope;
-                        let ray = Ray { origin: origin * spacing, direction: (direction * spacing).normalize() };
+                        let ray =
+                            Ray { origin: origin * spacing, direction: (direction * spacing).normalize() };
                         let [found, expected] = [tracer.trace(&ray), voxel_tracer.trace(&ray)];
                         greatest = f64::max(greatest, difference(&found, &expected));
                         lit += usize::from(expected.transmittance < 0.9);
