@@ -84,7 +84,8 @@ mod tests {
             ControlFlow::Continue(())
         });
         assert!(flow.is_continue());
-        assert!((ends.pop().unwrap() - 1.0).abs() < 1e-15);
+        // Each width is solved for: they are better known than their sums.
+        assert!((ends.pop().unwrap() - 1.0).abs() < 1e-14);
         ends
     }
 
@@ -135,7 +136,8 @@ mod tests {
                     prop_assert!((rise && w[1] >= w[0] - 1e-15) || (fall && w[1] <= w[0] + 1e-15));
                 }
                 for &edge in &edges {
-                    let inside = |v: f64| (v - edge).abs() > 4e-15;
+                    // Where the sum of widths is off by 1e-14, so is a value by at most 12 times that.
+                    let inside = |v: f64| (v - edge).abs() > 1.2e-13;
                     let above = values.iter().any(|&v| inside(v) && v > edge);
                     let below = values.iter().any(|&v| inside(v) && v < edge);
                     prop_assert!(!(above && below), "{:?} crosses {}", pair, edge);
