@@ -14,9 +14,10 @@
 //!
 //! # The error
 //! A pixel is within 1e-6 of the exact integral for the rules below; tests find 1e-12 on linear and on voxel fields and
-//! ask for 1e-8 on cells with curved coordinates. A field that is replaced keeps [`FIT_TOLERANCE`] except where local
-//! coordinates are singular, at the edge of a collapsed cell: there halving ends after a 4,096th of the stretch. Where a
-//! ray only just touches the value of a step of the transfer function, the error of the field counts with its root.
+//! ask for 1e-8 on cells with curved coordinates, and 1e-7 on cells whose nodes are one in every way that leaves them a
+//! volume. A field that is replaced keeps [`FIT_TOLERANCE`] except where local coordinates are singular, at the edge of
+//! a collapsed cell: there halving ends after a 4,096th of the stretch. Where a ray only just touches the value of a
+//! step of the transfer function, the error of the field counts with its root.
 //!
 //! # Rules where a grid leaves open what is true
 //! - A face of four nodes is two triangles, split at its node of the lowest number.
@@ -24,7 +25,9 @@
 //! - Where cells overlap, which valid ones do not, a stretch begins no earlier than those before it ended.
 //! - Where the interpolation has no inverse near (a cell folded over), the field is linear along the stretch,
 //!   between its values on the triangles where the ray enters and leaves.
-//! - A ray along a face or an edge, or through a node, counts as moved aside by next to nothing.
+//! - A ray along a face or an edge, or through a node, counts as moved aside by next to nothing: one way where that
+//!   is in a cell, else into the cell that it touches. So cells are closed, to within rounding, and beside a blank
+//!   one a face counts.
 //! - Blank cells, and cells with a value that is not finite, are empty; cells of clear values only do not count as
 //!   overlapping.
 //!
@@ -49,7 +52,7 @@ use self::fit::Septic;
 use self::surface::{SeenCell, Stretch};
 use self::view::View;
 use crate::image::Image;
-use crate::integral::{Integrator, LONGEST, Light, OPAQUE, add_constant};
+use crate::integral::{Integrator, Light, OPAQUE, add_constant};
 use crate::render::{Error, picture};
 use crate::transfer::{Band, Bands};
 
@@ -59,8 +62,11 @@ const TOLERANCE: f64 = 1e-11;
 /// Largest difference of a field from its polynomial, relative to the distance of control points that are near.
 const FIT_TOLERANCE: f64 = 1e-9;
 
-/// The same relative to the values themselves: below is rounding.
+/// The same relative to the values as they are counted: below is rounding.
 const ROUNDING: f64 = 1e-13;
+
+/// How far beside a cell a ray still is in it where no other cell has it, relative to the size of the grid: rounding.
+const CLOSED: f64 = 16.0 * f64::EPSILON;
 
 /// A grid, one of its scalars, and how values look: everything that is the same for all rays.
 #[derive(Debug)]
@@ -73,11 +79,22 @@ pub struct GridTracer<'a> {
     meshes: &'a [TriangleMesh],
 }
 
-/// Room for the work on one ray.
-#[derive(Default)]
-struct Room {
-    splits: Vec<f64>,
-    fits: Vec<(Septic, [f64; 2])>,
+/// Stretches in order, each with the part of it that lies between two ends and behind the others.
+fn arrange(mut stretches: Vec<Stretch>, [mut from, end]: [f64; 2]) -> Vec<(Stretch, [f64; 2])> {
+    let key = |stretch: &Stretch| (stretch.enter.t, stretch.leave.t);
+    stretches.sort_unstable_by(|a, b| {
+        let ((a_enter, a_leave), (b_enter, b_leave)) = (key(a), key(b));
+        a_enter.total_cmp(&b_enter).then(a_leave.total_cmp(&b_leave)).then(a.cell.cmp(&b.cell))
+    });
+    let mut parts = Vec::new();
+    for stretch in stretches {
+        let ends = [stretch.enter.t.max(from), stretch.leave.t.min(end)];
+        if ends[0] < ends[1] {
+            parts.push((stretch, ends));
+            from = ends[1];
+        }
+    }
+    parts
 }
 
 impl<'a> GridTracer<'a> {
@@ -138,23 +155,27 @@ impl<'a> GridTracer<'a> {
         let mut light = Light::CLEAR;
         let Some([low, high]) = self.boxes.bounds() else { return light };
         let Some(view) = View::new(ray, low / 2.0 + high / 2.0, distance) else { return light };
-        let (mut stretches, mut room) = (Vec::new(), Room::default());
+        let (mut inside, mut beside) = (Vec::new(), Vec::new());
         self.boxes.along(&view, |cell| {
-            self.see(&view, cell).stretches(cell, |stretch| stretches.push(stretch));
-        });
-        let key = |stretch: &Stretch| (stretch.enter.t, stretch.leave.t);
-        stretches.sort_unstable_by(|a, b| {
-            let ((a_enter, a_leave), (b_enter, b_leave)) = (key(a), key(b));
-            a_enter.total_cmp(&b_enter).then(a_leave.total_cmp(&b_leave)).then(a.cell.cmp(&b.cell))
-        });
-        let mut from = view.start;
-        for stretch in &stretches {
-            let ends = [stretch.enter.t.max(from), stretch.leave.t.min(view.end)];
-            if ends[0] < ends[1] {
-                self.cross(&view, stretch, ends, &mut room, &mut light);
-                from = ends[1];
+            let mut seen = self.see(&view, cell);
+            let count = inside.len();
+            seen.stretches(cell, |stretch| inside.push(stretch));
+            if inside.len() == count {
+                seen.move_nearer(CLOSED * self.boxes.reach());
+                seen.stretches(cell, |stretch| beside.push(stretch));
             }
-            if light.transmittance <= OPAQUE || from >= view.end {
+        });
+        let mut parts = arrange(inside, [view.start, view.end]);
+        if !beside.is_empty() {
+            let ends = parts.iter().flat_map(|(_, ends)| *ends);
+            let gaps: Vec<f64> = [view.start].into_iter().chain(ends).chain([view.end]).collect();
+            parts.extend(gaps.chunks_exact(2).flat_map(|gap| arrange(beside.clone(), [gap[0], gap[1]])));
+            parts.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
+        }
+        let mut fits = Vec::new();
+        for (stretch, ends) in &parts {
+            self.cross(&view, stretch, *ends, &mut fits, &mut light);
+            if light.transmittance <= OPAQUE {
                 break;
             }
         }
@@ -191,21 +212,29 @@ impl<'a> GridTracer<'a> {
     }
 
     /// Adds the light of a part of a stretch.
-    fn cross(&self, view: &View, stretch: &Stretch, ends: [f64; 2], room: &mut Room, light: &mut Light) {
+    fn cross(
+        &self,
+        view: &View,
+        stretch: &Stretch,
+        ends: [f64; 2],
+        fits: &mut Vec<(Septic, [f64; 2])>,
+        light: &mut Light,
+    ) {
         let seen = self.see(view, stretch.cell);
         let values = &seen.values[..seen.nodes.len()];
         let length = (ends[1] - ends[0]) / self.bands.unit_distance();
         if values.iter().all(|value| *value == values[0]) {
-            return add_constant(light, self.bands.at(values[0]), values[0], length.min(LONGEST));
+            return add_constant(light, &self.bands.at(0.0, values[0]), length);
         }
-        let integrator = Integrator { bands: &self.bands, tolerance: TOLERANCE };
-        let course = Course::new(&seen, stretch);
-        let Room { splits, fits, .. } = room;
-        if !course.fit(ends, self.fit_tolerance(values), fits) {
-            return integrator.add(light, &course.line(ends), length, splits);
+        let is_sliver = ends[1] - ends[0] <= CLOSED * self.boxes.reach();
+        let integrator = Integrator { bands: &self.bands, tolerance: TOLERANCE, is_sliver };
+        let base = seen.value_next_to(ends[0] / 2.0 + ends[1] / 2.0);
+        let course = Course::new(&seen, stretch, base);
+        if !course.fit(ends, self.fit_tolerance(values, base), fits) {
+            return integrator.add(light, &course.line(ends), base, length);
         }
         for (fit, [a, b]) in fits {
-            integrator.add(light, fit, (*b - *a) / self.bands.unit_distance(), splits);
+            integrator.add(light, fit, base, (*b - *a) / self.bands.unit_distance());
             if light.transmittance <= OPAQUE {
                 return;
             }
@@ -213,12 +242,13 @@ impl<'a> GridTracer<'a> {
     }
 
     /// How near a polynomial must be to the field between these values.
-    fn fit_tolerance(&self, values: &[f64]) -> f64 {
+    fn fit_tolerance(&self, values: &[f64], base: f64) -> f64 {
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         // Beside a step of the transfer function it is the place of the step that counts.
-        let near = if self.bands.edges_between(low, high).is_empty() { f64::INFINITY } else { high - low };
+        let near =
+            if self.bands.edges_between(low, high, 0.0).is_empty() { f64::INFINITY } else { high - low };
         let scale = self.bands.of_range(low, high).iter().map(Band::width).fold(near, f64::min);
-        (FIT_TOLERANCE * scale).max(ROUNDING * low.abs().max(high.abs()))
+        (FIT_TOLERANCE * scale).max(ROUNDING * (low - base).abs().max((high - base).abs()))
     }
 }

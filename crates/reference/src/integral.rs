@@ -13,11 +13,13 @@
 //! - *Poles*: where opacity reaches 1 at a point, extinction has a logarithmic pole. Halving grades the
 //!   intervals towards it; one of length `h` holds an optical depth of order `h ln h`, so it ends.
 //!
-//! It ends always: after [`MAX_HALVINGS`] an interval is shorter than the spacing of `f64` in a cell, and the
-//! field itself is not known better.
+//! It ends always, and soon: in a piece the field counts from its start, so that what is rounded is a part of the
+//! band's width, and intervals agree to that. After [`MAX_HALVINGS`] one is shorter than the spacing of `f64`.
 
-use crate::field::Field;
-use crate::transfer::{Band, Bands};
+use std::ops::ControlFlow;
+
+use crate::field::{Field, Piece};
+use crate::transfer::{Bands, Place};
 
 /// Largest estimated error of one interval of a ray, in colour or transmittance.
 ///
@@ -134,11 +136,11 @@ fn homogeneous(color: [f64; 3], depth: f64) -> Light {
 }
 
 /// Puts matter of one value, `length` unit distances of it, behind `front`.
-pub(crate) fn add_constant(front: &mut Light, band: &Band, value: f64, length: f64) {
-    let extinction = band.extinction(value);
+pub(crate) fn add_constant(front: &mut Light, place: &Place, length: f64) {
+    let extinction = place.extinction();
     // Opaque is opaque, however short the way: it might have been rounded to nothing.
-    let depth = if extinction.is_finite() { extinction * length } else { extinction };
-    *front = front.then(&homogeneous(band.color(value), depth));
+    let depth = if extinction.is_finite() { extinction * length.min(LONGEST) } else { extinction };
+    *front = front.then(&homogeneous(place.color(), depth));
 }
 
 /// How matter along a ray is integrated.
@@ -147,44 +149,59 @@ pub(crate) struct Integrator<'a> {
     pub(crate) bands: &'a Bands,
     /// Largest estimated error of one interval.
     pub(crate) tolerance: f64,
+    /// Whether the way may be no more than rounding, as between two faces where a ray passes an edge of cells: a value
+    /// of opacity 1 is then one that it is near to, not one that it keeps.
+    pub(crate) is_sliver: bool,
 }
 
 impl Integrator<'_> {
-    /// Puts the matter of a field behind `front`. Its unit interval is `length` unit distances of the transfer
-    /// function long. `splits` is room to work in.
-    pub(crate) fn add(&self, front: &mut Light, field: &impl Field, length: f64, splits: &mut Vec<f64>) {
+    /// Puts the matter of a field, which counts from `base`, behind `front`. Its unit interval is `length` unit
+    /// distances of the transfer function long.
+    pub(crate) fn add<const N: usize>(
+        &self,
+        front: &mut Light,
+        field: &impl Field<N>,
+        base: f64,
+        length: f64,
+    ) {
         // Far more unit distances than any picture can tell apart, yet safe to multiply.
         let length = length.min(LONGEST);
         let [low, high] = field.range();
         if high - low <= ROUNDING * low.abs().max(high.abs()) {
-            return add_constant(front, self.bands.at(low), low, length);
-        }
-        splits.clear();
-        splits.push(0.0);
-        if self.bands.of_range(low, high).len() > 1 {
-            field.splits(|low, high| self.bands.edges_between(low, high), |t| splits.push(t));
-            splits.sort_unstable_by(f64::total_cmp);
-        }
-        splits.push(1.0);
-        for ends in splits.windows(2) {
-            let band = self.bands.at(field.at(ends[0] + (ends[1] - ends[0]) / 2.0));
-            if ends[1] > ends[0] && !band.is_clear() {
-                let piece = Piece { field, band, length, tolerance: self.tolerance };
-                piece.add_to(front, ends[0], ends[1]);
-                if front.transmittance <= OPAQUE {
-                    return;
-                }
+            let place = self.bands.at(low, base);
+            if self.is_sliver {
+                let (color, extinction) = place.classify();
+                *front = front.then(&homogeneous(color, extinction * length));
+            } else {
+                add_constant(front, &place, length);
             }
+            return;
+        }
+        let _ = field.pieces(self.bands, base, |piece| {
+            self.add_piece(front, &piece, length);
+            if front.transmittance > OPAQUE { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+    }
+
+    fn add_piece<const N: usize>(&self, front: &mut Light, piece: &Piece<N>, length: f64) {
+        let (start, length) = (&piece.start, length * piece.width);
+        if start.band.is_clear() || piece.width <= 0.0 {
+            return;
+        }
+        if start.band.is_opaque() {
+            *front = front.then(&Light { color: start.color(), transmittance: 0.0 });
+        } else if start.band.is_uniform() {
+            add_constant(front, start, length);
+        } else {
+            let part = Part { piece, length, tolerance: self.tolerance };
+            part.refine(front, &part.interval(0.0, 1.0), 0);
         }
     }
 }
 
-/// A part of a ray in one cell and one band of the transfer function.
-struct Piece<'a, F> {
-    /// The field along the whole cell.
-    field: &'a F,
-    band: &'a Band,
-    /// World length of the field's unit interval, in unit distances of the transfer function.
+/// A piece and how long it is, in unit distances of the transfer function.
+struct Part<'a, const N: usize> {
+    piece: &'a Piece<'a, N>,
     length: f64,
     tolerance: f64,
 }
@@ -198,17 +215,9 @@ struct Interval {
     light: Light,
 }
 
-impl<F: Field> Piece<'_, F> {
-    /// Puts the part from `start` to `end` of the field's unit interval behind `front`.
-    fn add_to(&self, front: &mut Light, start: f64, end: f64) {
-        if self.band.is_opaque() {
-            let entry = Light { color: self.band.color(self.field.at(start)), transmittance: 0.0 };
-            *front = front.then(&entry);
-        } else if self.band.is_uniform() {
-            add_constant(front, self.band, self.field.at(start), self.length * (end - start));
-        } else {
-            self.refine(front, &self.interval(start, end - start), 0);
-        }
+impl<const N: usize> Part<'_, N> {
+    fn at(&self, t: f64) -> Place<'_> {
+        self.piece.start.up(self.piece.rise.at(t))
     }
 
     fn refine(&self, front: &mut Light, whole: &Interval, halvings: u32) {
@@ -218,14 +227,13 @@ impl<F: Field> Piece<'_, F> {
         let halves = first.light.then(&second.light);
         let error = whole.light.difference(&halves) * front.transmittance;
         let shallow = whole.depth.max(first.depth + second.depth) <= DEEPEST;
-        let color_change = self.band.color_slope() * self.field.max_slope() * whole.width;
+        let color_change = self.piece.start.band.color_slope() * self.piece.rise.max_slope() * whole.width;
         let flat = color_change <= self.tolerance;
         if halvings == MAX_HALVINGS || (error <= self.tolerance && (shallow || flat)) {
             let light = if shallow {
                 halves
             } else {
-                let middle = self.field.at(whole.start + half);
-                homogeneous(self.band.color(middle), first.depth + second.depth)
+                homogeneous(self.at(whole.start + half).color(), first.depth + second.depth)
             };
             *front = front.then(&light);
             return;
@@ -237,10 +245,12 @@ impl<F: Field> Piece<'_, F> {
     }
 
     fn interval(&self, start: f64, width: f64) -> Interval {
+        #[cfg(test)]
+        NUM_INTERVALS.with(|count| count.set(count.get() + 1));
         let mut colors = [[0.0; 3]; NUM_NODES];
         let mut depths = [0.0; NUM_NODES];
         for i in 0..NUM_NODES {
-            let (color, extinction) = self.band.classify(self.field.at(start + width * RULE.nodes[i]));
+            let (color, extinction) = self.at(start + width * RULE.nodes[i]).classify();
             colors[i] = color;
             depths[i] = extinction * self.length * width;
         }
@@ -257,6 +267,12 @@ impl<F: Field> Piece<'_, F> {
         let depth = dot(&RULE.weights);
         Interval { start, width, depth, light: Light { color, transmittance: (-depth).exp() } }
     }
+}
+
+#[cfg(test)]
+thread_local! {
+    /// Intervals that this thread has integrated: the work done.
+    pub(crate) static NUM_INTERVALS: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
 }
 
 #[cfg(test)]
@@ -294,9 +310,9 @@ mod tests {
         });
         let bands = Bands::new(&TransferFunction::new(points.to_vec(), 1.0).unwrap());
         let field = Cubic::new([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]);
-        let piece = Piece { field: &field, band: bands.at(0.5), length, tolerance: PIECE_TOLERANCE };
         let mut light = Light::CLEAR;
-        piece.add_to(&mut light, 0.0, 1.0);
+        Integrator { bands: &bands, tolerance: PIECE_TOLERANCE, is_sliver: false }
+            .add(&mut light, &field, 0.0, length);
         light
     }
 

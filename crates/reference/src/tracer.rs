@@ -10,12 +10,18 @@ use rayon::prelude::*;
 use volery_scene::{Ray, Sample, Samples, TransferFunction, TriangleMesh, VoxelGrid, for_samples};
 
 use crate::cell::{self, Corners};
-use crate::integral::{Integrator, LONGEST, Light, OPAQUE, PIECE_TOLERANCE, add_constant};
+use crate::integral::{Integrator, Light, OPAQUE, PIECE_TOLERANCE, add_constant};
 use crate::render::Error;
 use crate::transfer::{Band, Bands};
 
 /// Cells per axis of a block that is skipped as one.
 const BLOCK: usize = 8;
+
+/// Ways through a cell, in units of samples, that may be no more than the rounding of the places where they end.
+const SLIVER: f64 = 1e-12;
+
+/// Rounding of distances to the domain, relative to them.
+const FAR_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Everything that is the same for all rays: the grid, the transfer function, and where there is matter.
 #[derive(Debug)]
@@ -61,8 +67,8 @@ impl Way {
     }
 }
 
-/// From where to where `origin + t * direction` is in the box `[0, last]`, for `t` from `start` on; `None` if
-/// it is not for any length.
+/// From where to where `origin + t * direction` is in the box `[0, last]`, for `t` from `start` on: where it is not,
+/// the second number is below the first. `None` beside the box, which is closed.
 fn inside(origin: DVec3, direction: DVec3, last: DVec3, mut start: f64) -> Option<[f64; 2]> {
     let mut end = f64::INFINITY;
     for axis in 0..3 {
@@ -77,7 +83,7 @@ fn inside(origin: DVec3, direction: DVec3, last: DVec3, mut start: f64) -> Optio
             end = end.min((far - from) / along);
         }
     }
-    (start < end && end.is_finite()).then_some([start, end])
+    (start.is_finite() && end.is_finite()).then_some([start, end])
 }
 
 /// The axis of the least of three numbers, the first of equals.
@@ -151,13 +157,22 @@ impl<'a> Tracer<'a> {
             return None;
         }
         let spacing = self.grid.spacing();
-        let [entry, _] = inside(ray.origin, ray.direction, self.grid.extent(), 0.0)?;
+        let [entry, exit] = inside(ray.origin, ray.direction, self.grid.extent(), 0.0)?;
+        // From afar both are coarse: whether there is something in between is decided below.
+        if entry - exit > FAR_ROUNDING * entry {
+            return None;
+        }
         // One rounding, of a point in the domain: a far eye costs no digits across the ray; those it costs in
         // `entry` only shift the zero of `t`.
         let near = |axis: usize| ray.direction[axis].mul_add(entry, ray.origin[axis]) / spacing[axis];
-        let origin = DVec3::new(near(0), near(1), near(2));
+        let last = self.num_cells.map(|n| n as f64);
+        let origin = [0, 1, 2].map(|axis| match ray.direction[axis] {
+            // In the domain to the last bit, hence in its cells.
+            0.0 => near(axis).clamp(0.0, last[axis]),
+            _ => near(axis),
+        });
+        let (origin, last) = (DVec3::from_array(origin), DVec3::from_array(last));
         let direction = ray.direction / spacing;
-        let last = DVec3::from_array(self.num_cells.map(|n| n as f64));
         let [start, end] = inside(origin, direction, last, -entry)?;
         let end = end.min(distance - entry);
         (start < end).then_some(Way { origin, direction, start, end })
@@ -165,7 +180,6 @@ impl<'a> Tracer<'a> {
 
     fn walk<T: Sample>(&self, values: &[T], way: &Way) -> Light {
         let mut light = Light::CLEAR;
-        let mut splits = Vec::new();
         let mut t = way.start;
         let point = way.at(t);
         let mut cell = [0, 1, 2].map(|axis| (point[axis].max(0.0) as usize).min(self.num_cells[axis] - 1));
@@ -186,7 +200,7 @@ impl<'a> Tracer<'a> {
                     cell[other] = (point[other].max(0.0) as usize).clamp(first[other], end[other] - 1);
                 }
             } else if next > t {
-                self.cross(values, way, cell, [t, next], &mut splits, &mut light);
+                self.cross(values, way, cell, [t, next], &mut light);
                 if light.transmittance <= OPAQUE {
                     return light;
                 }
@@ -214,15 +228,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Adds the light of one cell, which the ray crosses from `t[0]` to `t[1]`.
-    fn cross<T: Sample>(
-        &self,
-        values: &[T],
-        way: &Way,
-        cell: [usize; 3],
-        t: [f64; 2],
-        splits: &mut Vec<f64>,
-        light: &mut Light,
-    ) {
+    fn cross<T: Sample>(&self, values: &[T], way: &Way, cell: [usize; 3], t: [f64; 2], light: &mut Light) {
         let corners = corners(values, self.grid, cell);
         // A blank cell holds no matter.
         let Some([low, high]) = cell::range(&corners) else { return };
@@ -232,12 +238,16 @@ impl<'a> Tracer<'a> {
         }
         let base = DVec3::from_array(cell.map(|c| c as f64));
         let local = |t: f64| (way.at(t) - base).clamp(DVec3::ZERO, DVec3::ONE);
-        let field = cell::along(&corners, local(t[0]), local(t[1]));
         let length = (t[1] - t[0]) / self.bands.unit_distance();
         if low == high {
-            return add_constant(light, self.bands.at(low), low, length.min(LONGEST));
+            return add_constant(light, &self.bands.at(0.0, low), length);
         }
-        Integrator { bands: &self.bands, tolerance: self.tolerance }.add(light, &field, length, splits);
+        let [enter, exit] = t.map(local);
+        let base = cell::base(&corners, enter, exit);
+        let field = cell::along(&corners, base, enter, exit);
+        let is_sliver = (exit - enter).abs().max_element() <= SLIVER;
+        let integrator = Integrator { bands: &self.bands, tolerance: self.tolerance, is_sliver };
+        integrator.add(light, &field, base, length);
     }
 }
 
@@ -282,4 +292,45 @@ fn blocks_with_matter<T: Sample>(
         range[0] <= range[1] && !bands.of_range(range[0], range[1]).iter().all(Band::is_clear)
     };
     (0..num_blocks.iter().product()).into_par_iter().map(holds_matter).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integral::NUM_INTERVALS;
+    use volery_scene::ControlPoint;
+
+    /// Intervals for rays all over noise between `offset` and `offset + span`.
+    fn work(offset: f64, span: f64) -> u64 {
+        let values: Vec<f64> = (0..512)
+            .map(|i| offset + span * ((volery_data::hash(i) >> 11) as f64 / (1u64 << 53) as f64))
+            .collect();
+        let grid = VoxelGrid::new([8; 3], DVec3::ONE, values).unwrap();
+        let points = [(0.1, 0.0), (0.5, 0.1), (0.5, 0.3), (0.7, 1.0), (0.995, 0.4)]
+            .map(|(w, opacity)| ControlPoint { value: offset + span * w, color: [w, 1.0 - w, 0.5], opacity });
+        let transfer = TransferFunction::new(points.to_vec(), 40.0).unwrap();
+        let tracer = Tracer::new(&grid, &transfer).unwrap();
+        NUM_INTERVALS.set(0);
+        for i in 0..256 {
+            let origin = DVec3::new(f64::from(i % 16) * 0.45, f64::from(i / 16) * 0.45, -9.0);
+            tracer.trace(&Ray { origin, direction: DVec3::new(0.1, 0.03, 1.0).normalize() });
+        }
+        NUM_INTERVALS.get()
+    }
+
+    #[test]
+    fn an_offset_costs_no_more_intervals_however_large() {
+        let twin = work(0.0, 1.0);
+        assert!(twin > 10_000, "{twin} intervals");
+        for (offset, span) in
+            [(1e6, 1e-2), (1e6, 1e-3), (1e9, 1.0), (4e9, 200.0), (-1e9, 1.0), (1e12, 1.0), (1e15, 100.0)]
+        {
+            let shifted = work(offset, span);
+            println!("{offset:e} + [0, {span:e}]: {shifted} intervals, {twin} without offset");
+            assert!(
+                shifted * 2 <= twin * 3,
+                "{offset:e} + [0, {span:e}]: {shifted} intervals, {twin} without"
+            );
+        }
+    }
 }

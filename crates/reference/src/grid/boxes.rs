@@ -29,20 +29,22 @@ struct Node {
 pub(super) struct Boxes {
     nodes: Vec<Node>,
     cells: Vec<u32>,
+    reach: f64,
 }
 
 impl Boxes {
     /// Over cells of these numbers and bounds.
     pub(super) fn new(cells: Vec<u32>, bounds: &[[DVec3; 2]]) -> Self {
         debug_assert_eq!(cells.len(), bounds.len());
-        let mut boxes = Self { nodes: Vec::new(), cells: Vec::new() };
+        let mut boxes = Self { nodes: Vec::new(), cells: Vec::new(), reach: 0.0 };
         if !cells.is_empty() {
             let mut order: Vec<u32> = (0..cells.len() as u32).collect();
             boxes.add(&mut order, 0, bounds);
             boxes.cells = order.into_iter().map(|place| cells[place as usize]).collect();
             // No cell is farther from the ray's origin than twice the grid, nor are its coordinates in its frame.
             let [low, high] = [boxes.nodes[0].low, boxes.nodes[0].high];
-            let slack = SLACK * (high - low).length().max(low.abs().max(high.abs()).max_element());
+            boxes.reach = (high - low).length().max(low.abs().max(high.abs()).max_element());
+            let slack = SLACK * boxes.reach;
             for node in &mut boxes.nodes {
                 node.low -= slack;
                 node.high += slack;
@@ -76,6 +78,11 @@ impl Boxes {
     /// Smallest and largest corner of all; `None` if there is no cell.
     pub(super) fn bounds(&self) -> Option<[DVec3; 2]> {
         self.nodes.first().map(|root| [root.low, root.high])
+    }
+
+    /// The size of all cells together, or how far they are from the zero of coordinates: what their rounding is of.
+    pub(super) fn reach(&self) -> f64 {
+        self.reach
     }
 
     /// Calls `found` for every cell that the ray may meet, and for some more.

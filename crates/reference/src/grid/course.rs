@@ -5,24 +5,27 @@ use volery_scene::CellType;
 
 use super::fit::Septic;
 use super::shape::Shape;
-use super::surface::{SeenCell, Stretch};
+use super::surface::{Passage, SeenCell, Stretch};
 use crate::cubic::Cubic;
 
 /// How often a stretch is halved for the sake of a fit.
 const MAX_HALVINGS: u32 = 12;
 
-/// The field over a stretch.
+/// The field over a stretch, by how far it is above `base`.
 pub(super) struct Course<'a> {
     shape: Option<Shape>,
     stretch: &'a Stretch,
+    /// Of the cell's nodes.
+    values: [f64; 8],
 }
 
 impl<'a> Course<'a> {
-    pub(super) fn new(cell: &SeenCell, stretch: &'a Stretch) -> Self {
+    pub(super) fn new(cell: &SeenCell, stretch: &'a Stretch, base: f64) -> Self {
         let is_linear = cell.cell_type == CellType::Tetrahedron;
         // Seen from where the ray enters, so that a small cell far away keeps its digits.
         let places = || cell.places.map(|place| place.with_z(place.z - stretch.enter.t));
-        Self { shape: (!is_linear).then(|| Shape::new(cell.cell_type, &places(), &cell.values)), stretch }
+        let values = cell.values.map(|value| value - base);
+        Self { shape: (!is_linear).then(|| Shape::new(cell.cell_type, &places(), &values)), stretch, values }
     }
 
     /// How far along the stretch.
@@ -63,7 +66,8 @@ impl<'a> Course<'a> {
 
     /// The part between two ends of the line between the values where the stretch enters and leaves.
     pub(super) fn line(&self, ends: [f64; 2]) -> Cubic {
-        let (from, to) = (self.stretch.enter.value, self.stretch.leave.value);
+        let value = |passage: &Passage| passage.mix(|corner| self.values[corner]);
+        let (from, to) = (value(&self.stretch.enter), value(&self.stretch.leave));
         let mix = |w: f64| from * (1.0 - w) + to * w;
         let [a, d] = ends.map(|t| mix(self.share(t)));
         Cubic::new([a, a * (2.0 / 3.0) + d / 3.0, a / 3.0 + d * (2.0 / 3.0), d])

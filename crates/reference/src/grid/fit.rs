@@ -3,7 +3,7 @@
 //! It takes the function's values at the eight Chebyshev points. What the interpolant leaves of a smooth function is
 //! nearly a multiple of the next Chebyshev polynomial, so it is measured where that is largest.
 
-use crate::field::{Field, crossing};
+use crate::field::{Field, Rise, crossing};
 
 const NUM_NODES: usize = 8;
 
@@ -74,7 +74,7 @@ fn evaluate(power: &[f64], x: f64) -> f64 {
     power.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }
 
-impl Field for Septic {
+impl Field<7> for Septic {
     #[inline]
     fn at(&self, t: f64) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.power;
@@ -94,18 +94,26 @@ impl Field for Septic {
         [self.power[0] - reach, self.power[0] + reach]
     }
 
-    fn max_slope(&self) -> f64 {
-        2.0 * self
-            .power
-            .iter()
-            .zip(0u8..)
-            .map(|(coefficient, k)| f64::from(k) * coefficient.abs())
-            .sum::<f64>()
+    fn rise(&self, start: f64) -> Rise<7> {
+        // Horner's scheme again and again: each pass leaves one more coefficient about the start.
+        let (mut power, x) = (self.power, 2.0 * start - 1.0);
+        for first in 0..NUM_NODES {
+            for k in (first..NUM_NODES - 1).rev() {
+                power[k] += x * power[k + 1];
+            }
+        }
+        let mut scale = 1.0;
+        Rise {
+            power: std::array::from_fn(|k| {
+                scale *= 2.0;
+                power[k + 1] * scale
+            }),
+        }
     }
 
     /// Between two neighbouring zeros of its derivative a function has at most one zero; so the zeros of the
     /// derivatives are found from the highest, which is a line, down.
-    fn turns(&self, found: impl FnMut(f64)) {
+    fn turns(&self) -> impl Iterator<Item = f64> {
         // The ends of the interval and the zeros between them.
         let mut ends = [-1.0; NUM_NODES + 1];
         ends[1] = 1.0;
@@ -138,7 +146,8 @@ impl Field for Septic {
             zeros[num_zeros] = 1.0;
             (ends, count) = (zeros, num_zeros + 1);
         }
-        ends[1..count - 1].iter().map(|x| 0.5 + 0.5 * x).filter(|t| *t > 0.0 && *t < 1.0).for_each(found);
+        let inner = ends.into_iter().take(count - 1).skip(1);
+        inner.map(|x| 0.5 + 0.5 * x).filter(|t| *t > 0.0 && *t < 1.0)
     }
 }
 
@@ -152,8 +161,7 @@ mod tests {
         let chebyshev = |t: f64| (7.0 * (2.0 * t - 1.0).acos()).cos();
         let (septic, error) = Septic::of(|t| Some(chebyshev(t))).unwrap();
         assert!(error < 1e-13, "{error:e}");
-        let mut turns = Vec::new();
-        septic.turns(|t| turns.push(t));
+        let turns: Vec<f64> = septic.turns().collect();
         let expected = (1..7).rev().map(|k| 0.5 + 0.5 * (f64::from(k) * std::f64::consts::PI / 7.0).cos());
         let expected: Vec<f64> = expected.collect();
         assert_eq!(turns.len(), expected.len(), "{turns:?}");
@@ -165,7 +173,10 @@ mod tests {
             let t = f64::from(i) / 64.0;
             assert!((septic.at(t) - chebyshev(t)).abs() < 1e-12);
             assert!(low <= chebyshev(t) && chebyshev(t) <= high);
-            assert!(septic.slope_at(t).abs() <= septic.max_slope());
+            assert!(septic.slope_at(t).abs() <= septic.rise(0.0).max_slope());
+            let rise = septic.rise(t).at(0.25);
+            let expected = septic.at(t + 0.25) - septic.at(t);
+            assert!((rise - expected).abs() < 1e-11, "{t}: {rise} {expected}");
         }
     }
 

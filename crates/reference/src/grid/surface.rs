@@ -30,12 +30,20 @@ pub(super) struct SeenCell<'a> {
 pub(super) struct Passage {
     /// Along the ray.
     pub(super) t: f64,
-    /// Linear in the triangle that is passed.
-    pub(super) value: f64,
+    /// The corners of the triangle that is passed, and their weights there.
+    corners: [usize; 3],
+    weights: [f64; 3],
     /// Local coordinates, linear in the triangle: right on triangles and parallelograms.
     pub(super) local: DVec3,
     /// 1 where the ray crosses the triangle clockwise, else -1.
     turn: i32,
+}
+
+impl Passage {
+    /// What is linear in the triangle, given what it is at the nodes.
+    pub(super) fn mix(&self, of: impl Fn(usize) -> f64) -> f64 {
+        self.corners.into_iter().zip(self.weights).map(|(corner, weight)| weight * of(corner)).sum()
+    }
 }
 
 /// A stretch of a ray inside a cell.
@@ -80,6 +88,22 @@ impl SeenCell<'_> {
         }
     }
 
+    /// The value of the node next to a place on the ray.
+    pub(super) fn value_next_to(&self, t: f64) -> f64 {
+        let distance = |place: &DVec3| place.with_z(place.z - t).length_squared();
+        let nodes = self.places.iter().zip(self.values).take(self.nodes.len());
+        let next = nodes.min_by(|(a, _), (b, _)| distance(a).total_cmp(&distance(b)));
+        next.map_or(0.0, |(_, value)| value)
+    }
+
+    /// Moves the cell across the ray, its middle nearer to it.
+    pub(super) fn move_nearer(&mut self, distance: f64) {
+        let places = &mut self.places[..self.nodes.len()];
+        let middle: DVec3 = places.iter().sum();
+        let shift = middle.with_z(0.0).normalize_or_zero() * distance;
+        places.iter_mut().for_each(|place| *place -= shift);
+    }
+
     /// Whether all nodes lie to one side of the ray, as is most often so.
     fn is_aside(&self) -> bool {
         let places = &self.places[..self.nodes.len()];
@@ -120,16 +144,9 @@ impl SeenCell<'_> {
         // Edge-on to the last bit: anywhere in the triangle is right.
         let weights = if sum > 0.0 { weights.map(|weight| weight / sum) } else { [1.0 / 3.0; 3] };
         let local = local_nodes(self.cell_type);
-        let mix = |of: &dyn Fn(usize) -> f64| (0..3).map(|i| weights[i] * of(corners[i])).sum::<f64>();
-        Some(Passage {
-            t: mix(&|corner| self.places[corner].z),
-            value: mix(&|corner| self.values[corner]),
-            local: corners
-                .into_iter()
-                .zip(weights)
-                .map(|(corner, w)| DVec3::from_array(local[corner]) * w)
-                .sum(),
-            turn: turn as i32,
-        })
+        let mut passage = Passage { t: 0.0, corners, weights, local: DVec3::ZERO, turn: turn as i32 };
+        passage.t = passage.mix(|corner| self.places[corner].z);
+        passage.local = DVec3::from_array([0, 1, 2].map(|axis| passage.mix(|corner| local[corner][axis])));
+        Some(passage)
     }
 }

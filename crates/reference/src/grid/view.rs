@@ -30,7 +30,11 @@ impl View {
         if !origin.is_finite() || distance.is_nan() {
             return None;
         }
-        let (right, up) = direction.any_orthonormal_pair();
+        // Along a plane of two axes, the third is one of the frame: what lies in the plane is in it to the last bit.
+        let (right, up) = match DVec3::AXES.into_iter().find(|axis| axis.dot(direction) == 0.0) {
+            Some(up) => (up.cross(direction), up),
+            None => direction.any_orthonormal_pair(),
+        };
         Some(Self { origin, direction, right, up, start: -shift, end: distance - shift })
     }
 

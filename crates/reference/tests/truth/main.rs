@@ -5,6 +5,8 @@
 mod against_marching;
 mod cells;
 mod closed_forms;
+mod collapsed;
+mod extremes;
 mod grids;
 mod planes;
 mod requests;
