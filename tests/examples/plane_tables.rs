@@ -6,18 +6,16 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
 
 use volery::glam::DVec3;
 use volery::output::write_image;
 use volery::{
-    Backend, Camera, Device, Focus, Image, Picture, Plane, Projection, Sampling, Session, Technique, View,
-    ViewOptions, VoxelGrid,
+    Camera, Focus, Image, Picture, Plane, Projection, Sampling, Session, Technique, View, ViewOptions,
+    VoxelGrid,
 };
-use volery_frame::{Brick, BrickId, DrawError, Drawn, Frame, UploadError, VolumeLayout};
 use volery_reference::metrics::{Comparison, compare};
 use volery_software::SoftwareBackend;
-use volery_tests::{Unblended, exact};
+use volery_tests::{Shared, Unblended, exact};
 
 /// Pictures are square, of so many pixels.
 const SIDE: u32 = 512;
@@ -36,49 +34,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut scenes = scenes(data)?;
     paper_table(&mut scenes)?;
     scenes.iter_mut().try_for_each(curve)
-}
-
-/// The software backend, of which more than one has hold.
-#[derive(Clone, Default)]
-struct Shared(Arc<Mutex<(SoftwareBackend, Option<VolumeLayout>)>>);
-
-impl Shared {
-    /// Forgets all bricks.
-    fn cool(&self) -> Result<(), UploadError> {
-        let (backend, layout) = &mut *self.0.lock().expect("no draw panics");
-        layout.as_ref().map_or(Ok(()), |layout| backend.set_volume(layout))
-    }
-
-    fn with<T>(&self, of: impl FnOnce(&mut SoftwareBackend) -> T) -> T {
-        of(&mut self.0.lock().expect("no draw panics").0)
-    }
-}
-
-impl Backend for Shared {
-    fn device(&self) -> Device {
-        self.with(|backend| backend.device())
-    }
-
-    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
-        self.0.lock().expect("no draw panics").1 = Some(*layout);
-        self.with(|backend| backend.set_volume(layout))
-    }
-
-    fn is_resident(&self, id: BrickId) -> bool {
-        self.with(|backend| backend.is_resident(id))
-    }
-
-    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
-        self.with(|backend| backend.upload(bricks))
-    }
-
-    fn resident_bytes(&self) -> u64 {
-        self.with(|backend| backend.resident_bytes())
-    }
-
-    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
-        self.with(|backend| backend.draw(frame))
-    }
 }
 
 /// A volume and how it is cut.
@@ -109,7 +64,7 @@ impl Scene {
             options.planes.planes = vec![plane];
             focus -= plane.normal * plane.signed_distance(focus);
         }
-        let backend = Shared::default();
+        let backend = Shared::new(Box::new(SoftwareBackend::new()));
         let session = Session::open(grid, Box::new(backend.clone()), Technique::Plane)?;
         let view = session.view(&options);
         Ok(Self { name, session, backend, view, focus })

@@ -16,7 +16,11 @@ use volery_frame::{
     Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, UploadError, VolumeLayout,
 };
 use volery_reference::metrics::{Comparison, compare};
-use volery_scene::VoxelGrid;
+use volery_scene::{Camera, TransferFunction, VoxelGrid};
+
+mod shared;
+
+pub use shared::Shared;
 
 /// The folder of real data: `VOLERY_DATA`, or `../shared/data` from the root of the workspace. `None` means that
 /// the test is ignored, and has been printed.
@@ -58,17 +62,28 @@ pub fn read_scene(data: &Path, name: &str) -> Input {
 /// When the input came without a scene file.
 pub fn view_of(input: &Input) -> View {
     let scene = input.scene.as_ref().expect("read from a scene file");
+    let view = matter_view(scene.camera, scene.transfer.clone(), scene.background, scene.size);
+    View { meshes: input.meshes.clone(), ..view }
+}
+
+/// A view of all matter in full resolution, in front of `background`.
+pub fn matter_view(
+    camera: Camera,
+    transfer: TransferFunction,
+    background: [f64; 3],
+    [width, height]: [u32; 2],
+) -> View {
     View {
-        width: scene.size[0],
-        height: scene.size[1],
-        camera: scene.camera,
-        transfer: scene.transfer.clone(),
-        background: scene.background,
+        width,
+        height,
+        camera,
+        transfer,
+        background,
         tolerance: None,
         planes: PlaneView::default(),
         thickness: Thickness::default(),
         stack: StackView::default(),
-        meshes: input.meshes.clone(),
+        meshes: [].into(),
     }
 }
 

@@ -58,6 +58,12 @@ fn random_cuts_cover_every_sample_once() {
 }
 
 #[test]
+fn nodes_are_counted_level_by_level() {
+    let nodes = [2, 0, 0, 2, 2].map(|level| Node::new(level, [0; 3])).to_vec();
+    assert_eq!(Cut { nodes, skipped: Vec::new() }.nodes_by_level(), [2, 0, 3]);
+}
+
+#[test]
 fn every_defect_is_found() {
     let layout = layout([9, 9, 9], Kind::Decimated, 2);
     let whole = select(&layout, |node: Node| if node.level > 1 { Answer::Descend } else { Answer::Draw });
@@ -78,6 +84,7 @@ fn every_defect_is_found() {
     assert_eq!(changed(&|cut| cut.skipped.push(outside)), [Defect::Outside { node: outside }]);
     assert_eq!(changed(&|cut| cut.nodes.swap(3, 4)), [Defect::Order { node }]);
     assert_eq!(changed(&|cut| cut.nodes.clear()), [Defect::Gap { node: layout.root() }]);
+    assert_eq!(Defect::Gap { node }.to_string(), "node (1, 1, 0) of level 1 is not covered");
     let beyond = Node::new(u32::MAX, [u32::MAX; 3]);
     assert_eq!(changed(&|cut| cut.skipped.push(beyond)), [Defect::Outside { node: beyond }]);
     let shattered = changed(&|cut| {
@@ -260,6 +267,30 @@ fn a_frustum_around_everything_and_a_defective_camera_skip_nothing() {
             let cut = select(&layout, (Frustum::new(&layout, &camera, 64, 64), |_: Node| Answer::Descend));
             assert_eq!(cut.skipped, []);
             assert_eq!(cut.nodes.len(), layout.num_nodes(0));
+        }
+    }
+}
+
+/// A corner exactly in the left edge of the picture, but for the rounding of an eye that may be far away.
+#[test]
+fn a_node_that_the_view_only_touches_stays() {
+    let layout = layout([33, 20, 9], Kind::Decimated, 4);
+    let node = Node::new(0, [3, 2, 1]);
+    let [low, high] = layout.world_bounds(node);
+    let mut noise = Noise(4);
+    for distance in [1e2, 1e4, 1e6, 1e9] {
+        for _ in 0..100 {
+            let camera = random_camera(&mut noise, high);
+            let [right, _, forward] = camera.axes();
+            let touched = DVec3::select(right.cmpgt(DVec3::ZERO), high, low);
+            let seen_from = |beside: f64| {
+                let target = touched + right * (3.0 + beside);
+                let (eye, projection) =
+                    (target - forward * distance, Projection::Orthographic { height: 6.0 });
+                Frustum::new(&layout, &Camera { eye, target, projection, ..camera }, 32, 32).answer(node)
+            };
+            assert_eq!(seen_from(0.0), Answer::Draw, "{distance:e} {camera:?}");
+            assert_eq!(seen_from(0.01), Answer::Skip, "{distance:e} {camera:?}");
         }
     }
 }

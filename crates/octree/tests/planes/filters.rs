@@ -131,6 +131,14 @@ fn a_node_is_drawn_when_it_is_farther_than_its_diagonal_times_the_quality() {
 }
 
 #[test]
+fn a_node_just_as_far_as_its_diagonal_times_the_quality_is_not_far() {
+    let layout = Layout::new([9, 1, 1], DVec3::ONE, Kind::Decimated, 4).unwrap();
+    let nodes = |x: f64, quality: f64| focused(&layout, DVec3::X * x, quality).nodes.len();
+    assert_eq!([nodes(12.0, 1.0), nodes(12.001, 1.0)], [2, 1]);
+    assert_eq!([nodes(20.0, 2.0), nodes(20.001, 2.0)], [2, 1]);
+}
+
+#[test]
 fn quality_0_is_the_root_infinity_the_full_resolution_and_nan_lowers_none() {
     for dims in DIMS {
         let layout = layout(dims, Kind::Decimated, 2);

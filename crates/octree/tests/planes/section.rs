@@ -276,7 +276,8 @@ fn planes_that_cannot_be_and_numbers_that_overflow_have_no_polygon() {
             let index_plane = IndexPlane::new(&layout, &plane);
             for node in layout.level_nodes(0) {
                 let vertices = section(&layout, node, &index_plane).vertices().len();
-                assert!(vertices <= 6);
+                // Near the origin the last of them overflows nowhere.
+                assert!(if bad == 1e308 { vertices <= 6 } else { vertices == 0 }, "{plane:?} {node}");
             }
         }
     }

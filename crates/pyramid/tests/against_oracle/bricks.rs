@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use volery_pyramid::layout::Error;
-use volery_pyramid::{Brick, Kind, Layout, NodeSource, Pyramid};
+use volery_pyramid::{Brick, Kind, Layout, Node, NodeSource, NodeStats, Pyramid};
 use volery_scene::{Samples, VoxelGrid};
 
 use crate::oracle;
@@ -130,7 +130,9 @@ fn a_brick_takes_on_the_type_of_its_source() {
         pyramid.read_brick(pyramid.layout().root(), &mut brick).unwrap();
         assert_eq!(brick.samples.sample_type(), sample_type);
         assert_eq!(brick.samples.value(0, 0), grid.samples().value(0, 0));
+        assert!(!brick.samples.is_empty() && pyramid.is_at_hand(pyramid.layout().root()));
     }
+    assert!(Brick::empty(volery_scene::SampleType::F64).samples.is_empty());
 }
 
 #[test]
@@ -141,4 +143,50 @@ fn coarser_levels_take_a_seventh() {
         println!("{kind:?}: {share:.4} of the samples, expected 1/7 and a few percent of it");
         assert!((0.142..0.152).contains(&share), "{share}");
     }
+}
+
+#[test]
+fn extra_bytes_are_those_of_coarser_samples_and_of_statistics() {
+    let volumes: [Samples; 2] = [vec![0u16; 9 * 6 * 5].into(), vec![[0u8; 3]; 9 * 6 * 5].into()];
+    for samples in volumes {
+        let sample_type = samples.sample_type();
+        let grid = VoxelGrid::new([9, 6, 5], DVec3::ONE, samples).unwrap();
+        for kind in KINDS {
+            let pyramid = Pyramid::build(&grid, kind, 2).unwrap();
+            let layout = pyramid.layout();
+            let samples = |level| layout.level_dims(level).iter().product::<usize>() * sample_type.bytes();
+            let stats = |level| layout.num_nodes(level) * sample_type.channels() * size_of::<NodeStats>();
+            let levels = layout.num_levels();
+            let expected = (1..levels).map(samples).sum::<usize>() + (0..levels).map(stats).sum::<usize>();
+            assert_eq!(pyramid.extra_bytes(), expected, "{sample_type} {kind:?}");
+        }
+    }
+}
+
+/// Trilinear interpolation at a point reads the samples less than 1 away from it along each axis.
+#[test]
+fn the_support_of_a_node_is_every_sample_that_its_field_reads() {
+    for dims in DIMS {
+        for kind in KINDS {
+            let layout = layout(dims, kind, 4);
+            assert_eq!(layout.domain(), DVec3::from_array(dims.map(|n| n as f64 - 1.0)));
+            for node in (0..layout.num_levels()).flat_map(|level| layout.level_nodes(level)) {
+                let [low, high] = layout.bounds(node);
+                let stretched = [low, high].map(|p| DVec3::new(p.x, p.y, 10.0 * p.z));
+                assert_eq!(layout.world_bounds(node), stretched);
+                let reads = |a: usize| low[a].floor() as usize..high[a].ceil() as usize + 1;
+                assert_eq!(layout.support(node), [0, 1, 2].map(reads), "{dims:?} {kind:?} {node}");
+            }
+        }
+    }
+}
+
+#[test]
+fn ancestors_cover_their_descendants() {
+    let node = Node::new(1, [5, 2, 9]);
+    assert_eq!(node.ancestor(1), node);
+    assert_eq!(node.ancestor(2), node.parent());
+    assert_eq!(node.ancestor(4), node.parent().parent().parent());
+    assert_eq!(node.ancestor(40), Node::new(40, [0; 3]));
+    assert_eq!(node.to_string(), "node (5, 2, 9) of level 1");
 }

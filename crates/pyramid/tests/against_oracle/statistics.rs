@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use proptest::prelude::*;
-use volery_pyramid::{Kind, NodeSource, NodeStats, Pyramid};
+use volery_pyramid::{Cube, CubeTree, Kind, NodeSource, NodeStats, Pyramid};
 use volery_scene::{Array, Samples, VoxelGrid};
 
 use crate::oracle;
@@ -226,6 +226,32 @@ fn extreme_values_neither_overflow_nor_panic() {
         let root = huge.stats(huge.layout().root())[0];
         assert_eq!([root.min, root.max], [-f64::MAX, f64::MAX]);
     }
+}
+
+#[test]
+fn a_mean_is_there_even_where_its_sum_overflows() {
+    let grid = grid([4; 3], vec![1.7e308; 64]);
+    let pyramid = Pyramid::build(&grid, Kind::Averaged, 2).unwrap();
+    let level = pyramid.level(1);
+    assert!((0..level.len()).all(|i| level.value(i, 0) == 1.7e308), "{level:?}");
+}
+
+#[test]
+fn the_error_of_schussman_and_max_is_the_largest_distance_from_the_mean() {
+    let stats = |min, max, mean| NodeStats { min, max, mean, std_dev: 1.0, error: 2.0, count: 3, blank: 0 };
+    assert_eq!(stats(1.0, 10.0, 3.0).schussman_max_error(), 7.0);
+    assert_eq!(stats(1.0, 10.0, 9.0).schussman_max_error(), 8.0);
+    let blank = stats(f64::INFINITY, f64::NEG_INFINITY, f64::NAN);
+    assert_eq!(blank.schussman_max_error(), 0.0);
+    assert!(blank.is_blank() && !stats(2.0, 2.0, 2.0).is_blank() && !stats(1.0, 2.0, 1.5).is_blank());
+}
+
+#[test]
+fn texels_of_cubes_are_values_less_offset_by_scale() {
+    let tree = CubeTree::build(&grid([4, 2, 2], vec![14u8; 16]), 2.0, 10.0);
+    assert_eq!((tree.texel(14.0), tree.texel(9.0)), (2.0, -0.5));
+    assert_eq!(tree.level(1), [Cube { mean: 2.0, min: 2.0, max: 2.0 }; 2]);
+    assert_eq!(tree.bytes(), (2 + 1) * size_of::<Cube>());
 }
 
 /// Deviations far below the values: sums of squares without care would lose them.
