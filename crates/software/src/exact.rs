@@ -132,7 +132,7 @@ impl<S: Simd> Row<S> {
 }
 
 /// A polynomial of degree 3 about the place of each lane, by powers.
-type Cubic<S> = [f32x16<S>; 4];
+pub(crate) type Cubic<S> = [f32x16<S>; 4];
 
 #[inline(always)]
 fn at<S: Simd>(cubic: &Cubic<S>, x: f32x16<S>) -> f32x16<S> {
@@ -199,6 +199,17 @@ fn reach<S: Simd>(
     lanes.select(x, span)
 }
 
+/// The field along the way of each lane through its cell.
+pub(crate) struct Field<S: Simd> {
+    /// The texel from the origin, by powers of the share of the way.
+    pub(crate) cubic: Cubic<S>,
+    /// Least and greatest corner of the cell: no value lies beyond, whatever rounding says, so that a field that only
+    /// touches a step stays on its side.
+    pub(crate) range: [f32x16<S>; 2],
+    /// The way in unit lengths.
+    pub(crate) length: f32x16<S>,
+}
+
 /// Where each lane stands in its cell.
 struct Course<S: Simd> {
     /// The texel from the band's base, about the place reached; the whole way through the cell is 1.
@@ -206,6 +217,8 @@ struct Course<S: Simd> {
     /// The way through the cell, as optical depth per `-ln(1 - opacity)`.
     length: f32x16<S>,
     turns: [f32x16<S>; 2],
+    /// Of the corners, from the origin of texels.
+    range: [f32x16<S>; 2],
     band: i32x16<S>,
     row: Row<S>,
     /// Where the section between turns ends, and how far that is.
@@ -228,20 +241,26 @@ struct Interval<S: Simd> {
 
 impl<S: Simd> Course<S> {
     #[inline(always)]
-    fn new(simd: S, bands: Bands<'_>, cubic: &Cubic<S>, length: f32x16<S>, lanes: mask32x16<S>) -> Self {
+    fn new(simd: S, bands: Bands<'_>, field: &Field<S>, lanes: mask32x16<S>) -> Self {
         let zero = f32x16::splat(simd, 0.0);
         // Other lanes may hold anything, blanks too.
-        let cubic = &cubic.map(
+        let mut cubic = field.cubic.map(
             #[inline(always)]
             |coefficient| lanes.select(coefficient, zero),
         );
-        let turns = turns(simd, cubic);
+        let range = field.range.map(
+            #[inline(always)]
+            |end| lanes.select(end, zero),
+        );
+        cubic[0] = cubic[0].max(range[0]).min(range[1]);
+        let turns = turns(simd, &cubic);
         let band = bands.find(simd, cubic[0]);
         let row = bands.rows(simd, band);
         let mut course = Self {
             cubic: [cubic[0] - row.base, cubic[1], cubic[2], cubic[3]],
-            length: length * bands.depth_scale,
+            length: field.length * bands.depth_scale,
             turns,
+            range,
             band,
             row,
             section_end: zero,
@@ -273,8 +292,10 @@ impl<S: Simd> Course<S> {
         let row = &self.row;
         let u = self.cubic[0];
         let u_end = at(&self.cubic, self.span);
+        let [least, greatest] = [self.range[0] - row.base, self.range[1] - row.base];
         let edge = self.rises.select(row.high, row.low);
-        let beyond = (self.rises & u_end.simd_gt(edge)) | (!self.rises & u_end.simd_lt(edge));
+        let above = self.rises & u_end.simd_gt(edge) & greatest.simd_gt(edge);
+        let beyond = above | (!self.rises & u_end.simd_lt(edge) & least.simd_lt(edge));
         let target = beyond.select(edge, u_end);
 
         let floor = f32x16::splat(simd, MIN_CLEARNESS);
@@ -390,21 +411,19 @@ impl<S: Simd> Course<S> {
     }
 }
 
-/// Adds the light of one cell per lane. `cubic` is the texel along the way through it, from the origin of texels, by
-/// powers of the share of the way; `length` is that way in unit lengths.
+/// Adds the light of one cell per lane.
 #[inline(never)]
 pub(crate) fn add_cells<S: Simd>(
     simd: S,
     bands: Bands<'_>,
-    cubic: &[f32x16<S>; 4],
-    length: f32x16<S>,
+    field: &Field<S>,
     lanes: mask32x16<S>,
     light: &mut Light<S>,
 ) {
     // A function of its own, once for all types of texels.
     simd.vectorize(
         #[inline(always)]
-        || follow(simd, bands, cubic, length, lanes, light),
+        || follow(simd, bands, field, lanes, light),
     );
 }
 
@@ -412,12 +431,11 @@ pub(crate) fn add_cells<S: Simd>(
 fn follow<S: Simd>(
     simd: S,
     bands: Bands<'_>,
-    cubic: &[f32x16<S>; 4],
-    length: f32x16<S>,
+    field: &Field<S>,
     lanes: mask32x16<S>,
     light: &mut Light<S>,
 ) {
-    let mut course = Course::new(simd, bands, cubic, length, lanes);
+    let mut course = Course::new(simd, bands, field, lanes);
     // Three sections of every band, each cut towards and from a pole; dense ones end by their depth.
     for _ in 0..64 + 64 * bands.bands.len() {
         if course.active.all_false() {
@@ -543,12 +561,16 @@ mod tests {
                     Bands { bands: transfer.bands(), depth_scale: transfer.depth_scale() as f32 };
                 let mut powers = cubic(&corners, from, to);
                 powers[0] -= transfer.texel_origin();
+                let range = [f64::min, f64::max].map(|of| {
+                    corners.iter().copied().reduce(of).unwrap() - transfer.texel_origin()
+                });
                 let found = dispatch!(Level::new(), simd => {
                     let splat = |x: f64| f32x16::splat(simd, x as f32);
                     let powers = powers.map(splat);
                     let mut light = Light::none(simd);
                     let all = mask32x16::splat(simd, true);
-                    add_cells(simd, bands, &powers, splat(way.length()), all, &mut light);
+                    let field = Field { cubic: powers, range: range.map(splat), length: splat(way.length()) };
+                    add_cells(simd, bands, &field, all, &mut light);
                     let color: [[f32; 16]; 3] = light.color.map(Into::into);
                     let clear: [f32; 16] = light.transmittance.into();
                     [color[0][3], color[1][3], color[2][3], clear[3]]

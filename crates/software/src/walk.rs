@@ -13,7 +13,7 @@ use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::Occupancy;
-use crate::exact::{Bands, EXACT_DOUBT, add_cells};
+use crate::exact::{Bands, EXACT_DOUBT, Field, add_cells};
 use crate::math::{axes, four, front_weight, opacity_of_depth, transpose};
 use crate::packet::Span;
 use crate::texel::Texel;
@@ -202,8 +202,9 @@ impl<S: Simd> Piece<S> {
             |i| to.integrals[i] - from.integrals[i],
         );
         let inverse = extinction.simd_ne(0.0).select(1.0 / extinction, f32x16::splat(simd, 0.0));
-        let light = [r, g, b];
-        Self { light, inverse, depth: length * extinction / bins }
+        // So far beyond the table that two ends are one there is nothing.
+        let depth = bins.simd_ne(0.0).select(length * extinction / bins, f32x16::splat(simd, 0.0));
+        Self { light: [r, g, b], inverse, depth }
     }
 
     /// Mean colour, weighted by extinction; black if there is none.
@@ -420,6 +421,20 @@ impl<S: Simd> Cell<S> {
         ]
     }
 
+    /// The least and the greatest texel.
+    #[inline(always)]
+    fn range(&self) -> [f32x16<S>; 2] {
+        let high = four(
+            #[inline(always)]
+            |i| self.low[i] + self.slope[i],
+        );
+        let [a, b, c, d] = four(
+            #[inline(always)]
+            |i| [self.low[i].min(high[i]), self.low[i].max(high[i])],
+        );
+        [a[0].min(b[0]).min(c[0].min(d[0])), a[1].max(b[1]).max(c[1].max(d[1]))]
+    }
+
     /// The part of the field that no parabola is: the coefficient of `x y z`.
     #[inline(always)]
     fn twist(&self) -> f32x16<S> {
@@ -537,7 +552,8 @@ pub(crate) fn walk<S: Simd, T: Texel>(
                 #[inline(always)]
                 |depth| walker.fraction(simd, depth),
             );
-            add_cells(simd, table.bands, &cell.along(from, to), half + half, exact, light);
+            let field = Field { cubic: cell.along(from, to), range: cell.range(), length: half + half };
+            add_cells(simd, table.bands, &field, exact, light);
             light.doubt += (behind - light.transmittance) * EXACT_DOUBT;
         }
         light.add(simd, &near.pieces, read);

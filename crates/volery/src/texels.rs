@@ -5,7 +5,7 @@
 //! | u8, i8 | U8 | none |
 //! | u16, i16 | U16 | none |
 //! | RGB, RGBA | Rgba8, opaque where there is no fourth channel | none |
-//! | u32, i32, f32, f64 | F32, from 0 to 1 over a window of values | at most 2^-25 of the window in it, 2^-24 of the distance from its start beyond |
+//! | u32, i32, f32, f64 | F32, from 0 to at most 1 over a window of values | at most 2^-24 of the window in it, 2^-24 of the distance from its start beyond |
 //!
 //! Relative to a window, since `f32` texels near 1e6 would leave nothing of a range of 1. The window is the range of
 //! finite values, or that part of it in which the transfer function changes where this is much smaller: one outlier, or
@@ -41,9 +41,7 @@ impl Encoding {
             SampleType::U16 => integers(TexelType::U16, 0.0),
             SampleType::I16 => integers(TexelType::U16, f64::from(i16::MIN)),
             SampleType::U32 | SampleType::I32 | SampleType::F32 | SampleType::F64 => {
-                let width = range[1] - range[0];
-                let scale = if width > 0.0 { width } else { 1.0 };
-                Self { texel: TexelType::F32, scale, offset: range[0] }
+                Self { texel: TexelType::F32, scale: 1.0, offset: 0.0 }.over(range)
             }
             SampleType::Rgb8 | SampleType::Rgba8 => integers(TexelType::Rgba8, 0.0),
         }
@@ -59,7 +57,17 @@ impl Encoding {
         if self.texel != TexelType::F32 || width <= 0.0 || reach.max(self.scale) <= MAX_WINDOW * width {
             return *self;
         }
-        Self { texel: self.texel, scale: width, offset: low }
+        self.over([low, high])
+    }
+
+    /// Texels from 0 to at most 1 over a window. In units of a power of two, and from a whole number where the window is
+    /// wide enough: whole numbers stay exact, and many others.
+    fn over(self, [low, high]: [f64; 2]) -> Self {
+        let width = high - low;
+        let scale = if width > 0.0 { width.log2().ceil().exp2() } else { 1.0 };
+        let scale = if scale.is_normal() { scale } else { width };
+        let offset = if width >= 2.0 { low.floor() } else { low };
+        Self { scale, offset, ..self }
     }
 
     /// From the smallest to the largest value that texels can stand for.

@@ -244,7 +244,7 @@ fn piece_to(from_end: End, texel: f32, depth_scale: f32) -> Piece {
     let sums = textureLoad(transfer, vec2i(other, 0), 0);
     let change = sums - from_end.sums;
     // One division for two: by the bins passed and by the change of depth.
-    let num_bins = bin + f32(other - entry) - from_end.bin;
+    let num_bins = (bin - from_end.bin) + f32(other - entry);
     let inverse = 1.0 / (num_bins * select(change.w, 1.0, abs(change.w) < INVISIBLE));
     let depth = depth_scale * change.w * (change.w * inverse);
     let end = End(texel, bin, select(sums, from_end.sums, is_flat));
@@ -438,7 +438,9 @@ fn shallow_width(band: Band, cubic: vec4f, width: f32, goal: f32, length: f32) -
 
 // Adds the light of one cell, along whose way the texel is this cubic; `length` is the way's optical depth to the base
 // 2 per -ln(1 - opacity).
-fn add_exactly(light: ptr<function, Light>, whole: vec4f, length: f32) {
+fn add_exactly(light: ptr<function, Light>, field: vec4f, range: vec2f, length: f32) {
+    // No value lies beyond the corners, whatever rounding says: a field that only touches a step stays on its side.
+    let whole = vec4f(clamp(field.x, range.x, range.y), field.yzw);
     // Where the cubic turns.
     let root = sqrt(whole.z * whole.z - 3.0 * whole.w * whole.y);
     let q = -(whole.z + select(root, -root, whole.z < 0.0));
@@ -467,7 +469,8 @@ fn add_exactly(light: ptr<function, Light>, whole: vec4f, length: f32) {
         }
         let u_end = cubic_at(cubic, span);
         let edge = select(band.low, band.high, rises);
-        let is_beyond = select((u_end < edge), (edge < u_end), rises);
+        let falls_past = u_end < edge && range.x - band.base < edge;
+        let is_beyond = select(falls_past, (edge < u_end && edge < range.y - band.base), rises);
         var goal = select(u_end, edge, is_beyond);
         let now = band.clearness - band.opacity_slope * cubic.x;
         let then = band.clearness - band.opacity_slope * goal;
@@ -545,7 +548,9 @@ fn light_along(ray: Ray) -> Light {
         let peak = max(stored.low, stored.low + stored.rise);
         let is_blank = HAS_BLANKS && max(max(peak.x, peak.y), max(peak.z, peak.w)) >= BLANK;
         let is_matter = is_visible && !is_blank;
-        let corners = texels_of(stored);
+        // What is no matter may be anything, and must not count.
+        let texels = texels_of(stored);
+        let corners = Corners(select(vec4f(0.0), texels.low, is_matter), select(vec4f(0.0), texels.rise, is_matter));
 
         // The box that this round leaves.
         let radius = f32(words.x) - 1.0;
@@ -581,7 +586,14 @@ fn light_along(ray: Ray) -> Light {
         if is_exact {
             let enter = (origin + t * ray.direction) * inverse_scale;
             let length = (t_next - t) * ray.depth_per_t * frame.depth_scale;
-            add_exactly(&light, cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.direction), length);
+            let top = corners.low + corners.rise;
+            let least = min(corners.low, top);
+            let greatest = max(corners.low, top);
+            let range = vec2f(
+                min(min(least.x, least.y), min(least.z, least.w)),
+                max(max(greatest.x, greatest.y), max(greatest.z, greatest.w)));
+            let cubic = cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.direction);
+            add_exactly(&light, cubic, range, length);
             light.doubt += EXACT_DOUBT * (light_behind - light.transmittance);
         } else {
             light.doubt += color_doubt + select(doubt, 0.125 * doubt, is_halved);

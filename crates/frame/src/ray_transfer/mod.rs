@@ -15,8 +15,8 @@
 //!
 //! # What the bins cover
 //! The texels that can be seen: from the first control point behind which there is matter to the last one, within the
-//! values that the volume has. What lies outside of that, padding, fill values, outliers, costs no bin. All else is
-//! transparent and reads as the sums at the ends.
+//! values that the volume has. What lies outside of that, padding, fill values, outliers, costs no bin: it is transparent
+//! and reads as the sums at the ends. Matter that goes on far beyond the control points is left to the exact way.
 //!
 //! # Texels from an origin
 //! Texels are counted from [`RayTransfer::texel_origin`], in the middle of what can be seen, so that `f32` keeps the
@@ -47,6 +47,9 @@ pub const MAX_BIN_VARIATION: f64 = 0.01;
 
 /// The largest optical depth of the longest chord of a cell where the table is read.
 pub const MAX_TABLE_DEPTH: f64 = 2.0;
+
+/// Where matter goes on at the values beyond the control points, bins do so over this many times the width between them.
+const MAX_EXTENSION: f64 = 4.0;
 
 /// Entries before the first bin, so that what lies below reads as two equal sums.
 const PADDING: usize = 2;
@@ -134,11 +137,18 @@ impl RayTransfer {
         let is_whole = matches!(layout.texel, TexelType::U8 | TexelType::U16);
         let held = layout.value_range.map(|value| (value - layout.value_offset) / layout.value_scale);
         let held = [held[0].min(held[1]), held[0].max(held[1])];
-        let seen = segments::visible(&segments).map(|seen| [seen[0].max(held[0]), seen[1].min(held[1])]);
         // Where nothing can be seen any window will do.
-        let [low, high] = seen.filter(|seen| seen[0] <= seen[1]).unwrap_or([held[0]; 2]);
-        let [low, high] = if is_whole { [low.floor(), high.ceil()] } else { [low, high] };
-        let middle = low + (high - low) / 2.0;
+        let seen = segments::visible(&segments).map(|seen| [seen[0].max(held[0]), seen[1].min(held[1])]);
+        let seen = seen.filter(|seen| seen[0] <= seen[1]);
+        // Matter without end need not take the bins from where it changes.
+        let points = [segments[0].ends[1], segments[segments.len() - 1].ends[0]];
+        let points = points.map(|texel| texel.clamp(held[0], held[1]));
+        let beyond = MAX_EXTENSION * (points[1] - points[0]);
+        let seen = seen.unwrap_or([points[0]; 2]);
+        let window = [seen[0].max(points[0] - beyond), seen[1].min(points[1] + beyond)];
+        let goes_on = [seen[0] < window[0], seen[1] > window[1]];
+        let [low, high] = if is_whole { [window[0].floor(), window[1].ceil()] } else { window };
+        let middle = (points[0] + (points[1] - points[0]) / 2.0).clamp(low, high);
         let texel_origin = if is_whole { middle.floor() } else { f64::from(middle as f32) };
         let width = if high > low { high - low } else { 1.0 };
         // Where texels are whole numbers bins end on them: control points mostly stand there.
@@ -163,7 +173,15 @@ impl RayTransfer {
         let range = end_bin(below, low, max_depth, depth_scale).range;
         bins[..PADDING].fill(Bin { range, ..Bin::CLEAR });
 
-        let hardness: Vec<f32> = (0..bins.len()).map(|bin| hardness(&bins, bin)).collect();
+        let mut hardness: Vec<f32> = (0..bins.len()).map(|bin| hardness(&bins, bin)).collect();
+        // The table knows nothing of what goes on beyond its ends.
+        let num = bins.len();
+        for (goes_on, end) in goes_on.into_iter().zip([0..PADDING, PADDING + num_bins..num]) {
+            if goes_on {
+                hardness[end.clone()].fill(f32::INFINITY);
+                bins[end].iter_mut().for_each(|bin| bin.is_visible = true);
+            }
+        }
         let is_easy = |bin: &usize| f64::from(hardness[*bin]) * longest_chord <= 1.0;
         let rise = |bin: usize| Bin::variation(&bins[bin..=bin]);
         let slope = (0..bins.len()).filter(is_easy).map(rise).fold(0.0, f64::max) / bin_width;
