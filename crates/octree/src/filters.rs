@@ -88,7 +88,8 @@ impl<'a> Frustum<'a> {
         let [a, b, c, d] = sides.map(|(point, normal)| {
             // Whichever way the cross products turn, the middle of the picture is inside.
             let middle = rays.ray(width / 2.0, height / 2.0);
-            let inside = (middle.origin + middle.direction - point).dot(normal);
+            // The difference first: beside a far eye a direction is nothing.
+            let inside = (middle.origin - point + middle.direction).dot(normal);
             (point, normal * inside.signum())
         });
         let reach = layout.world_bounds(layout.root())[1].length() + camera.eye.length();

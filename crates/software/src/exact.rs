@@ -63,6 +63,8 @@ pub(crate) struct Bands<'a> {
     pub(crate) bands: &'a [Band],
     /// Optical depth of a unit length per `-ln(1 - opacity)`.
     pub(crate) depth_scale: f32,
+    /// Cells of a larger range, in texels, lie beside an outlier.
+    pub(crate) huge: f32,
 }
 
 /// A band per lane.
@@ -203,6 +205,9 @@ fn reach<S: Simd>(
 pub(crate) struct Field<S: Simd> {
     /// The texel from the origin, by powers of the share of the way.
     pub(crate) cubic: Cubic<S>,
+    /// What it is at both ends as the neighbouring cells have it: beside an outlier, where rounding is more than all that
+    /// can be seen, no band between the two may be passed unseen.
+    pub(crate) ends: [f32x16<S>; 2],
     /// Least and greatest corner of the cell: no value lies beyond, whatever rounding says, so that a field that only
     /// touches a step stays on its side.
     pub(crate) range: [f32x16<S>; 2],
@@ -217,8 +222,12 @@ struct Course<S: Simd> {
     /// The way through the cell, as optical depth per `-ln(1 - opacity)`.
     length: f32x16<S>,
     turns: [f32x16<S>; 2],
-    /// Of the corners, from the origin of texels.
+    /// No slope is larger.
+    steepest: f32x16<S>,
+    /// Of the corners, and the texel at the end of the cell, from the origin of texels.
     range: [f32x16<S>; 2],
+    last: f32x16<S>,
+    is_huge: mask32x16<S>,
     band: i32x16<S>,
     row: Row<S>,
     /// Where the section between turns ends, and how far that is.
@@ -252,7 +261,14 @@ impl<S: Simd> Course<S> {
             #[inline(always)]
             |end| lanes.select(end, zero),
         );
-        cubic[0] = cubic[0].max(range[0]).min(range[1]);
+        let is_huge = (range[1] - range[0]).simd_gt(bands.huge);
+        let last = cubic[0] + cubic[1] + cubic[2] + cubic[3];
+        let [first, last] = [(field.ends[0], cubic[0]), (field.ends[1], last)].map(
+            #[inline(always)]
+            |(held, end)| is_huge.select(held, end).max(range[0]).min(range[1]),
+        );
+        cubic[0] = first;
+        let steepest = cubic[1].abs() + cubic[2].abs() * 2.0 + cubic[3].abs() * 3.0;
         let turns = turns(simd, &cubic);
         let band = bands.find(simd, cubic[0]);
         let row = bands.rows(simd, band);
@@ -260,7 +276,10 @@ impl<S: Simd> Course<S> {
             cubic: [cubic[0] - row.base, cubic[1], cubic[2], cubic[3]],
             length: field.length * bands.depth_scale,
             turns,
+            steepest,
             range,
+            last,
+            is_huge,
             band,
             row,
             section_end: zero,
@@ -282,8 +301,15 @@ impl<S: Simd> Course<S> {
         self.active &= !(lanes & self.section_end.simd_ge(one));
         self.span = lanes.select(next - self.section_end, self.span);
         self.section_end = lanes.select(next, self.section_end);
-        let rises = at(&self.cubic, self.span).simd_ge(self.cubic[0]);
+        let rises = self.end(simd).simd_ge(self.cubic[0]);
         self.rises = (lanes & rises) | (!lanes & self.rises);
+    }
+
+    /// The texel at the end of the section: at that of the cell what the next one begins with.
+    #[inline(always)]
+    fn end(&self, simd: S) -> f32x16<S> {
+        let is_last = self.section_end.simd_ge(f32x16::splat(simd, 1.0)) & self.is_huge;
+        is_last.select(self.last - self.row.base, at(&self.cubic, self.span))
     }
 
     /// The interval that begins where the lanes stand.
@@ -291,7 +317,7 @@ impl<S: Simd> Course<S> {
     fn next(&self, simd: S) -> Interval<S> {
         let row = &self.row;
         let u = self.cubic[0];
-        let u_end = at(&self.cubic, self.span);
+        let u_end = self.end(simd);
         let [least, greatest] = [self.range[0] - row.base, self.range[1] - row.base];
         let edge = self.rises.select(row.high, row.low);
         let above = self.rises & u_end.simd_gt(edge) & greatest.simd_gt(edge);
@@ -309,6 +335,8 @@ impl<S: Simd> Course<S> {
         let target = is_cut.select(limit, target);
         let crosses = beyond & !is_cut & self.active;
         let width = reach(simd, &self.cubic, self.span, [u_end, target], crosses | is_cut);
+        // Beside an outlier bands are passed in less than rounding. Yet not in nothing.
+        let width = (crosses & self.is_huge).select(width.max((target - u).abs() / self.steepest), width);
         self.shallow(simd, Interval { width, target, crosses, is_cut })
     }
 
@@ -352,11 +380,15 @@ impl<S: Simd> Course<S> {
     fn add(&self, simd: S, interval: &Interval<S>, light: &mut Light<S>) {
         let row = &self.row;
         let zero = f32x16::splat(simd, 0.0);
-        let texels = axes(
+        let nodes = axes(
             #[inline(always)]
             |i| at(&self.cubic, interval.width * NODES[i]),
         );
-        let is_opaque = texels[0].simd_eq(texels[2]) & row.clearness(texels[1]).simd_le(zero) | row.is_opaque();
+        let texels = axes(
+            #[inline(always)]
+            |i| nodes[i].max(row.low).min(row.high),
+        );
+        let is_opaque = nodes[0].simd_eq(nodes[2]) & row.clearness(nodes[1]).simd_le(zero) | row.is_opaque();
         let depths = axes(
             #[inline(always)]
             |i| {
@@ -558,7 +590,7 @@ mod tests {
                 };
                 let transfer = RayTransfer::new(&tf, &layout);
                 let bands =
-                    Bands { bands: transfer.bands(), depth_scale: transfer.depth_scale() as f32 };
+                    Bands { bands: transfer.bands(), depth_scale: transfer.depth_scale() as f32, huge: 1e3 };
                 let mut powers = cubic(&corners, from, to);
                 powers[0] -= transfer.texel_origin();
                 let range = [f64::min, f64::max].map(|of| {
@@ -569,7 +601,9 @@ mod tests {
                     let powers = powers.map(splat);
                     let mut light = Light::none(simd);
                     let all = mask32x16::splat(simd, true);
-                    let field = Field { cubic: powers, range: range.map(splat), length: splat(way.length()) };
+                    let ends = [powers[0], powers[0] + powers[1] + powers[2] + powers[3]];
+                    let (range, length) = (range.map(splat), splat(way.length()));
+                    let field = Field { cubic: powers, ends, range, length };
                     add_cells(simd, bands, &field, all, &mut light);
                     let color: [[f32; 16]; 3] = light.color.map(Into::into);
                     let clear: [f32; 16] = light.transmittance.into();

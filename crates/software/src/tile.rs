@@ -72,7 +72,11 @@ pub(crate) fn draw<T: Texel>(
         texel_origin: transfer.texel_origin() as f32,
         bin_from_texel: transfer.bin_from_texel().map(|x| x as f32),
         slope: transfer.slope() as f32,
-        bands: Bands { bands: transfer.bands(), depth_scale: transfer.depth_scale() as f32 },
+        bands: Bands {
+            bands: transfer.bands(),
+            depth_scale: transfer.depth_scale() as f32,
+            huge: transfer.huge_range() as f32,
+        },
     };
     let rays = frame.camera.rays(frame.width, frame.height);
     let shared = Shared { layout, unit_length: transfer.unit_length(), rays, surfaces, table, drawables };

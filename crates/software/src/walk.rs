@@ -298,8 +298,10 @@ impl<'a, S: Simd> Walker<'a, S> {
         let depth = exit[0].min(exit[1]).min(exit[2]).max(self.depth);
         for axis in 0..3 {
             let position = self.span.direction[axis].mul_add(depth, self.span.entry[axis]);
-            // Along the axis of exit the next cell is certain; along others, rounding must not leave the block.
-            let inside = position.floor().max(first[axis]).min(first[axis] + (size - 1.0));
+            // Along the axis of exit the next cell is certain; along others, rounding must not leave the block, nor a ray
+            // in the last face the brick.
+            let last = (first[axis] + (size - 1.0)).min(f32x16::splat(simd, self.cells[axis] - 1.0));
+            let inside = position.floor().max(first[axis]).min(last);
             let beyond = self.forward[axis].select(first[axis] + size, first[axis] - 1.0);
             let next = exit[axis].simd_le(depth).select(beyond, inside);
             self.cell[axis] = lanes.select(next, self.cell[axis]);
@@ -552,7 +554,8 @@ pub(crate) fn walk<S: Simd, T: Texel>(
                 #[inline(always)]
                 |depth| walker.fraction(simd, depth),
             );
-            let field = Field { cubic: cell.along(from, to), range: cell.range(), length: half + half };
+            let (cubic, range, length) = (cell.along(from, to), cell.range(), half + half);
+            let field = Field { cubic, ends: [first, last], range, length };
             add_cells(simd, table.bands, &field, exact, light);
             light.doubt += (behind - light.transmittance) * EXACT_DOUBT;
         }

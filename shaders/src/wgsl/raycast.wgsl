@@ -52,6 +52,8 @@ struct Frame {
     // Optical depth per -ln(1 - opacity) of a stretch, as a share of the depth that it has in units of length.
     depth_scale: f32,
     num_bands: u32,
+    // Cells of a larger range, in texels, lie beside an outlier.
+    huge_range: f32,
     // Of surfaces: what is added to their depth to count from the ray's start, and finest cells per depth for a
     // direction of length 1 as the frame has it.
     surface_offset: f32,
@@ -398,8 +400,9 @@ fn reach(cubic: vec4f, span: f32, u_end: f32, goal: f32) -> f32 {
 
 // Adds the light of an interval of this width.
 fn add_interval(light: ptr<function, Light>, band: Band, cubic: vec4f, width: f32, length: f32) {
-    let u = vec3f(cubic_at(cubic, 0.11270167 * width), cubic_at(cubic, 0.5 * width), cubic_at(cubic, 0.88729835 * width));
-    let is_opaque = u.x == u.z && band.clearness - band.opacity_slope * u.y <= 0.0;
+    let nodes = vec3f(cubic_at(cubic, 0.11270167 * width), cubic_at(cubic, 0.5 * width), cubic_at(cubic, 0.88729835 * width));
+    let u = clamp(nodes, vec3f(band.low), vec3f(band.high));
+    let is_opaque = nodes.x == nodes.z && band.clearness - band.opacity_slope * nodes.y <= 0.0;
     let extinctions = vec3f(extinction_at(band, u.x), extinction_at(band, u.y), extinction_at(band, u.z));
     let depths = select(extinctions, vec3f(OPAQUE), is_opaque) * (length * width);
     let weights = vec3f(5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0);
@@ -438,9 +441,14 @@ fn shallow_width(band: Band, cubic: vec4f, width: f32, goal: f32, length: f32) -
 
 // Adds the light of one cell, along whose way the texel is this cubic; `length` is the way's optical depth to the base
 // 2 per -ln(1 - opacity).
-fn add_exactly(light: ptr<function, Light>, field: vec4f, range: vec2f, length: f32) {
-    // No value lies beyond the corners, whatever rounding says: a field that only touches a step stays on its side.
-    let whole = vec4f(clamp(field.x, range.x, range.y), field.yzw);
+fn add_exactly(light: ptr<function, Light>, field: vec4f, ends: vec2f, range: vec2f, length: f32) {
+    // No value lies beyond the corners, whatever rounding says: a field that only touches a step stays on its side. And
+    // beside an outlier its ends are those of the neighbouring cells: no band between the two may be passed unseen.
+    let is_huge = range.y - range.x > frame.huge_range;
+    let first = clamp(select(field.x, ends.x, is_huge), range.x, range.y);
+    let last = clamp(ends.y, range.x, range.y);
+    let whole = vec4f(first, field.yzw);
+    let steepest = abs(whole.y) + 2.0 * abs(whole.z) + 3.0 * abs(whole.w);
     // Where the cubic turns.
     let root = sqrt(whole.z * whole.z - 3.0 * whole.w * whole.y);
     let q = -(whole.z + select(root, -root, whole.z < 0.0));
@@ -464,10 +472,10 @@ fn add_exactly(light: ptr<function, Light>, field: vec4f, range: vec2f, length: 
             let next = select(select(1.0, turns.y, turns.y > section_end), turns.x, turns.x > section_end);
             span = next - section_end;
             section_end = next;
-            rises = cubic_at(cubic, span) >= cubic.x;
+            rises = select(cubic_at(cubic, span), last - band.base, is_huge && section_end >= 1.0) >= cubic.x;
             is_start = false;
         }
-        let u_end = cubic_at(cubic, span);
+        let u_end = select(cubic_at(cubic, span), last - band.base, is_huge && section_end >= 1.0);
         let edge = select(band.low, band.high, rises);
         let falls_past = u_end < edge && range.x - band.base < edge;
         let is_beyond = select(falls_past, (edge < u_end && edge < range.y - band.base), rises);
@@ -484,6 +492,8 @@ fn add_exactly(light: ptr<function, Light>, field: vec4f, range: vec2f, length: 
         var width = span;
         if is_cut || is_beyond {
             width = reach(cubic, span, u_end, goal);
+            // Beside an outlier bands are passed in less than rounding. Yet not in nothing.
+            width = select(width, max(width, abs(goal - cubic.x) / steepest), is_huge && !is_cut);
         }
         let part = shallow_width(band, cubic, width, goal, length);
         let is_deep = part < width;
@@ -593,7 +603,7 @@ fn light_along(ray: Ray) -> Light {
                 min(min(least.x, least.y), min(least.z, least.w)),
                 max(max(greatest.x, greatest.y), max(greatest.z, greatest.w)));
             let cubic = cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.direction);
-            add_exactly(&light, cubic, range, length);
+            add_exactly(&light, cubic, vec2f(end.texel, last), range, length);
             light.doubt += EXACT_DOUBT * (light_behind - light.transmittance);
         } else {
             light.doubt += color_doubt + select(doubt, 0.125 * doubt, is_halved);

@@ -51,6 +51,9 @@ pub const MAX_TABLE_DEPTH: f64 = 2.0;
 /// Where matter goes on at the values beyond the control points, bins do so over this many times the width between them.
 const MAX_EXTENSION: f64 = 4.0;
 
+/// In widths of what the bins cover.
+const HUGE_RANGE: f64 = 1e3;
+
 /// Entries before the first bin, so that what lies below reads as two equal sums.
 const PADDING: usize = 2;
 
@@ -243,6 +246,12 @@ impl RayTransfer {
     /// off by at most `d` times this times its length.
     pub fn slope(&self) -> f64 {
         self.slope
+    }
+
+    /// A cell whose corners differ by more texels lies beside an outlier: `f32` rounds its field to more than what tells
+    /// one thing that can be seen from another.
+    pub fn huge_range(&self) -> f64 {
+        HUGE_RANGE * self.entries.len() as f64 / self.bin_from_texel[0]
     }
 
     /// The bands in order, without a gap; at least two.
