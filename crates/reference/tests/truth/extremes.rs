@@ -181,6 +181,18 @@ fn a_ray_through_samples_of_opacity_1_is_not_stopped_by_them() {
     check("rays through samples at a peak", greatest, THRESHOLD);
 }
 
+/// A ray in a layer of samples of opacity 1 keeps that value all the way, so it is opaque however long a unit is.
+#[test]
+fn a_ray_along_samples_of_opacity_1_sees_them() {
+    let grid = ramp([6, 6, 6], DVec3::ONE, DVec3::Z * 0.25, 0.0);
+    let tent = transfer(&[(0.0, [1.0; 3], 0.0), (0.5, COLOR, 1.0), (1.0, [1.0; 3], 0.0)], 1e3);
+    let tracer = Tracer::new(&grid, &tent).unwrap();
+    for direction in [DVec3::X, -DVec3::Y, DVec3::new(0.6, 0.8, 0.0)] {
+        let light = tracer.trace(&Ray { origin: DVec3::new(1.2, 1.3, 2.0) - direction * 9.0, direction });
+        assert_eq!((light.color, light.transmittance), (COLOR, 0.0), "along {direction}");
+    }
+}
+
 /// A far ray brought near to where it meets something, with one rounding.
 fn near(ray: &Ray, way: f64) -> Ray {
     let moved = |axis: usize| ray.direction[axis].mul_add(way, ray.origin[axis]);
@@ -361,6 +373,30 @@ fn a_plane_in_a_layer_shows_the_layer() {
         assert!(count([0.0, 1.0, 0.0]) > 2000, "{} pixels", count([0.0, 1.0, 0.0]));
         assert_eq!(count([1.0, 0.0, 0.0]), 0, "from {eye}");
     }
+}
+
+/// Of the nearest samples, those above count in the middle between two layers, though places on it are rounded.
+#[test]
+fn a_plane_in_the_middle_of_two_layers_shows_the_upper_one() {
+    let layer = |i: usize| if i / 30 == 2 { 100.0 } else { 0.0 };
+    let samples: Vec<f64> = (0..120).map(layer).collect();
+    let grid = VoxelGrid::new([6, 5, 4], DVec3::new(1.0, 0.3, 0.1), samples).unwrap();
+    let matter = transfer(&[(50.0, [1.0, 0.0, 0.0], 0.1), (50.0, [0.0, 1.0, 0.0], 0.5)], 1.0);
+    let planes = [Plane { normal: DVec3::Z * 3.0, distance: 3.0 * 0.15 }];
+    let scene = PlaneScene {
+        grid: &grid,
+        planes: &planes,
+        transfer: &matter,
+        nearest: true,
+        is_transparent: false,
+        meshes: &[],
+    };
+    let middle = grid.extent() / 2.0;
+    let camera = perspective(middle + DVec3::new(3.0, -5.0, 4.0), middle, 5.0);
+    let drawn = scene.render(&camera, [0.0; 3], [61, 47], &|_| {}).unwrap();
+    let count = |color: [f64; 3]| drawn.pixels().iter().filter(|pixel| **pixel == color).count();
+    assert!(count([0.0, 1.0, 0.0]) > 2000, "{} pixels", count([0.0, 1.0, 0.0]));
+    assert_eq!(count([1.0, 0.0, 0.0]), 0);
 }
 
 /// Opacity 1 at the last value of a uniform far block; nothing overflows.
