@@ -77,7 +77,7 @@ fn a_shift_that_is_exact_changes_not_a_bit() {
             [(0.0, [0.2, 0.9, 0.4], 0.0), (0.25, COLOR, 1.0), (0.75, [0.3; 3], 0.2), (0.75, COLOR, 0.4)];
         let matter = transfer(&points.map(|(value, color, opacity)| (offset + value, color, opacity)), 0.7);
         let voxels = VoxelGrid::new([5, 4, 3], DVec3::ONE, values(offset)).unwrap();
-        let cells = lattice([4, 3, 2], Filling::Hexahedra, |p| p * (1.0 + 0.1 * p.z));
+        let cells = lattice([4, 3, 2], Filling::Hexahedra, |p| p * (1.0 + 0.7 * p.z));
         let nodes = [values(offset), vec![offset; 24]].concat();
         let tracer = GridTracer::new(&cells, &nodes.into(), &matter).unwrap();
         let planes = [Plane::through(voxels.extent() / 2.0, DVec3::new(0.3, -0.5, 0.81))];
@@ -243,6 +243,31 @@ fn far_eyes_see_what_near_ones_see() {
         for (what, error) in ["voxels", "cells", "planes"].into_iter().zip(greatest) {
             check(&format!("{what} from {far:e} sizes away"), error, THRESHOLD);
         }
+    }
+}
+
+/// From afar, where the ray enters is coarser than the corner that it cuts off.
+#[test]
+fn far_eyes_see_corners_thinner_than_the_rounding_of_distances() {
+    let grid = uniform([3, 3, 3], DVec3::ONE, 1.0);
+    let matter = transfer(&[(1.0, COLOR, 0.5)], 1e-5);
+    let tracer = Tracer::new(&grid, &matter).unwrap();
+    let mut random = Random::new(34);
+    for far in [1e9, 1e12] {
+        let (mut greatest, mut lit) = (0.0, 0);
+        for _ in 0..300 {
+            let target = DVec3::new(random.unit() * 1e-5, random.unit() * 1e-5, 0.5 + random.unit());
+            let direction = DVec3::new(1.0, -0.5 - random.unit(), 0.1 * random.unit()).normalize();
+            let ray = Ray { origin: target - direction * far, direction };
+            let close = near(&ray, far - 3.0);
+            let chord = slab(&close, DVec3::ZERO, grid.extent()).map_or(0.0, |[a, b]| b - a);
+            lit += usize::from(chord > 0.0);
+            let error = 1.0 - tracer.trace(&ray).transmittance - opacity(matter.extinction(1.0) * chord);
+            greatest = f64::max(greatest, error.abs());
+        }
+        assert!(lit > 50, "{lit} rays meet the corner");
+        // Where a near ray enters is rounded, too: to 1e-15, of units of 1e-5.
+        check(&format!("corners from {far:e} sizes away"), greatest, THRESHOLD);
     }
 }
 
