@@ -228,7 +228,7 @@ impl<'a> GridTracer<'a> {
         }
         let is_sliver = ends[1] - ends[0] <= CLOSED * self.boxes.reach();
         let integrator = Integrator { bands: &self.bands, tolerance: TOLERANCE, is_sliver };
-        let base = seen.value_next_to(ends[0] / 2.0 + ends[1] / 2.0);
+        let base = values[0];
         let course = Course::new(&seen, stretch, base);
         if !course.fit(ends, self.fit_tolerance(values, base), fits) {
             return integrator.add(light, &course.line(ends), base, length);

@@ -341,4 +341,17 @@ mod tests {
         let light = white(0.0, 1e-30, 1.0);
         assert!((light.color[0] / 0.5e-30 - 1.0).abs() < 1e-14, "{:e}", light.color[0]);
     }
+
+    /// What one colour and opacity, or one colour and great depth, have as a closed form takes no halving.
+    #[test]
+    fn uniform_and_deep_matter_take_few_intervals() {
+        let intervals = |low: f64, high: f64, length: f64| {
+            NUM_INTERVALS.set(0);
+            let light = white(low, high, length);
+            assert!((light.over([1.0; 3])[0] - 1.0).abs() < 1e-11);
+            NUM_INTERVALS.get()
+        };
+        assert_eq!(intervals(0.4, 0.4, 3.0), 0);
+        assert_eq!(intervals(0.1, 0.3, 1e12), 3);
+    }
 }

@@ -25,7 +25,8 @@
 //!   extinction pictures are within 1e-12. Of unstructured grids a pixel is within 1e-6.
 //! - This ends where `f64` does. A ray that turns back within `d` of the value of a step (in units of the range
 //!   of a cell) is off by some `1e-16 / sqrt(d)` of a cell in what it has behind the step, at most 4e-8: one
-//!   that only touches opacity 1 may be opaque or not. The places of faces are rounded to 1e-15 of a cell, so
+//!   that only touches opacity 1 may be opaque or not, and so may one that has it for less than 1e-16 of a cell,
+//!   as at the end of a cell with an outlier of 1e20. The places of faces are rounded to 1e-15 of a cell, so
 //!   where a cell is more than 1e5 unit distances long a shell that a face cuts may be off by more than 1e-9.
 //! - Time does not depend on offsets.
 //! - The same bits whatever the number of threads.

@@ -88,14 +88,6 @@ impl SeenCell<'_> {
         }
     }
 
-    /// The value of the node next to a place on the ray.
-    pub(super) fn value_next_to(&self, t: f64) -> f64 {
-        let distance = |place: &DVec3| place.with_z(place.z - t).length_squared();
-        let nodes = self.places.iter().zip(self.values).take(self.nodes.len());
-        let next = nodes.min_by(|(a, _), (b, _)| distance(a).total_cmp(&distance(b)));
-        next.map_or(0.0, |(_, value)| value)
-    }
-
     /// Moves the cell across the ray, its middle nearer to it.
     pub(super) fn move_nearer(&mut self, distance: f64) {
         let places = &mut self.places[..self.nodes.len()];

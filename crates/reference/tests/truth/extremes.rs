@@ -77,7 +77,7 @@ fn a_shift_that_is_exact_changes_not_a_bit() {
             [(0.0, [0.2, 0.9, 0.4], 0.0), (0.25, COLOR, 1.0), (0.75, [0.3; 3], 0.2), (0.75, COLOR, 0.4)];
         let matter = transfer(&points.map(|(value, color, opacity)| (offset + value, color, opacity)), 0.7);
         let voxels = VoxelGrid::new([5, 4, 3], DVec3::ONE, values(offset)).unwrap();
-        let cells = lattice([4, 3, 2], Filling::Hexahedra, |p| p * (1.0 + 0.1 * p.z));
+        let cells = lattice([4, 3, 2], Filling::Hexahedra, |p| p * (1.0 + 0.7 * p.z));
         let nodes = [values(offset), vec![offset; 24]].concat();
         let tracer = GridTracer::new(&cells, &nodes.into(), &matter).unwrap();
         let planes = [Plane::through(voxels.extent() / 2.0, DVec3::new(0.3, -0.5, 0.81))];
@@ -181,6 +181,18 @@ fn a_ray_through_samples_of_opacity_1_is_not_stopped_by_them() {
     check("rays through samples at a peak", greatest, THRESHOLD);
 }
 
+/// A ray in a layer of samples of opacity 1 keeps that value all the way, so it is opaque however long a unit is.
+#[test]
+fn a_ray_along_samples_of_opacity_1_sees_them() {
+    let grid = ramp([6, 6, 6], DVec3::ONE, DVec3::Z * 0.25, 0.0);
+    let tent = transfer(&[(0.0, [1.0; 3], 0.0), (0.5, COLOR, 1.0), (1.0, [1.0; 3], 0.0)], 1e3);
+    let tracer = Tracer::new(&grid, &tent).unwrap();
+    for direction in [DVec3::X, -DVec3::Y, DVec3::new(0.6, 0.8, 0.0)] {
+        let light = tracer.trace(&Ray { origin: DVec3::new(1.2, 1.3, 2.0) - direction * 9.0, direction });
+        assert_eq!((light.color, light.transmittance), (COLOR, 0.0), "along {direction}");
+    }
+}
+
 /// A far ray brought near to where it meets something, with one rounding.
 fn near(ray: &Ray, way: f64) -> Ray {
     let moved = |axis: usize| ray.direction[axis].mul_add(way, ray.origin[axis]);
@@ -231,6 +243,31 @@ fn far_eyes_see_what_near_ones_see() {
         for (what, error) in ["voxels", "cells", "planes"].into_iter().zip(greatest) {
             check(&format!("{what} from {far:e} sizes away"), error, THRESHOLD);
         }
+    }
+}
+
+/// From afar, where the ray enters is coarser than the corner that it cuts off.
+#[test]
+fn far_eyes_see_corners_thinner_than_the_rounding_of_distances() {
+    let grid = uniform([3, 3, 3], DVec3::ONE, 1.0);
+    let matter = transfer(&[(1.0, COLOR, 0.5)], 1e-5);
+    let tracer = Tracer::new(&grid, &matter).unwrap();
+    let mut random = Random::new(34);
+    for far in [1e9, 1e12] {
+        let (mut greatest, mut lit) = (0.0, 0);
+        for _ in 0..300 {
+            let target = DVec3::new(random.unit() * 1e-5, random.unit() * 1e-5, 0.5 + random.unit());
+            let direction = DVec3::new(1.0, -0.5 - random.unit(), 0.1 * random.unit()).normalize();
+            let ray = Ray { origin: target - direction * far, direction };
+            let close = near(&ray, far - 3.0);
+            let chord = slab(&close, DVec3::ZERO, grid.extent()).map_or(0.0, |[a, b]| b - a);
+            lit += usize::from(chord > 0.0);
+            let error = 1.0 - tracer.trace(&ray).transmittance - opacity(matter.extinction(1.0) * chord);
+            greatest = f64::max(greatest, error.abs());
+        }
+        assert!(lit > 50, "{lit} rays meet the corner");
+        // Where a near ray enters is rounded, too: to 1e-15, of units of 1e-5.
+        check(&format!("corners from {far:e} sizes away"), greatest, THRESHOLD);
     }
 }
 
@@ -361,6 +398,30 @@ fn a_plane_in_a_layer_shows_the_layer() {
         assert!(count([0.0, 1.0, 0.0]) > 2000, "{} pixels", count([0.0, 1.0, 0.0]));
         assert_eq!(count([1.0, 0.0, 0.0]), 0, "from {eye}");
     }
+}
+
+/// Of the nearest samples, those above count in the middle between two layers, though places on it are rounded.
+#[test]
+fn a_plane_in_the_middle_of_two_layers_shows_the_upper_one() {
+    let layer = |i: usize| if i / 30 == 2 { 100.0 } else { 0.0 };
+    let samples: Vec<f64> = (0..120).map(layer).collect();
+    let grid = VoxelGrid::new([6, 5, 4], DVec3::new(1.0, 0.3, 0.1), samples).unwrap();
+    let matter = transfer(&[(50.0, [1.0, 0.0, 0.0], 0.1), (50.0, [0.0, 1.0, 0.0], 0.5)], 1.0);
+    let planes = [Plane { normal: DVec3::Z * 3.0, distance: 3.0 * 0.15 }];
+    let scene = PlaneScene {
+        grid: &grid,
+        planes: &planes,
+        transfer: &matter,
+        nearest: true,
+        is_transparent: false,
+        meshes: &[],
+    };
+    let middle = grid.extent() / 2.0;
+    let camera = perspective(middle + DVec3::new(3.0, -5.0, 4.0), middle, 5.0);
+    let drawn = scene.render(&camera, [0.0; 3], [61, 47], &|_| {}).unwrap();
+    let count = |color: [f64; 3]| drawn.pixels().iter().filter(|pixel| **pixel == color).count();
+    assert!(count([0.0, 1.0, 0.0]) > 2000, "{} pixels", count([0.0, 1.0, 0.0]));
+    assert_eq!(count([1.0, 0.0, 0.0]), 0);
 }
 
 /// Opacity 1 at the last value of a uniform far block; nothing overflows.

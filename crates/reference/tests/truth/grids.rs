@@ -169,6 +169,25 @@ fn a_face_beside_a_blank_cell_belongs_to_the_one_that_is_not() {
     }
 }
 
+/// Part of a ray in a face with a blank cell beside it, part between two that are not: in the order of the ray.
+#[test]
+fn a_ray_beside_blank_cells_and_between_others_meets_them_in_order() {
+    let matter = wild(0.8);
+    let grid = lattice([2, 2, 1], Filling::Hexahedra, |p| p);
+    let field = values(&grid, |p| 0.15 + 0.3 * p.x + 0.1 * p.z);
+    let whole = GridTracer::new(&grid, &field, &matter).unwrap();
+    for blank in 0..4 {
+        let marked = grid.clone().with_blank((0..4).map(|cell| cell == blank).collect()).unwrap();
+        let tracer = GridTracer::new(&marked, &field, &matter).unwrap();
+        for direction in [DVec3::X, -DVec3::X] {
+            let ray = Ray { origin: DVec3::new(1.0, 1.0, 0.4) - 3.0 * direction, direction };
+            let (found, expected) = (tracer.trace(&ray), whole.trace(&ray));
+            assert!(expected.transmittance < 0.9);
+            assert!(difference(&found, &expected) < 1e-12, "{blank} {direction}: {found:?}, {expected:?}");
+        }
+    }
+}
+
 /// Boxes of the voxels as cells, with the values of the voxels.
 #[test]
 fn hexahedra_that_are_voxels_look_as_voxels_do() {
@@ -292,13 +311,11 @@ fn frustums_of_hexahedra_and_wedges_are_as_their_shape_functions_say() {
 
 #[test]
 fn a_pyramid_is_as_its_shape_functions_say() {
-    let matter = wild(0.4);
     let apex = DVec3::new(0.3, 0.9, 1.2);
     let points = vec![DVec3::ZERO, DVec3::X * 1.5, DVec3::new(1.5, 1.5, 0.0), DVec3::Y * 1.5, apex];
     let cells = Cells::new(vec![CellType::Pyramid], vec![0, 1, 2, 3, 4]).unwrap();
     let grid = UnstructuredGrid::new(points.clone(), cells).unwrap();
     let nodes = [0.05, 0.9, 0.15, 0.7, 0.45];
-    let tracer = GridTracer::new(&grid, &nodes.to_vec().into(), &matter).unwrap();
     let value = |p: DVec3| {
         let t = p.z / apex.z;
         let base = (p - apex * t) / (1.0 - t) / 1.5;
@@ -312,7 +329,12 @@ fn a_pyramid_is_as_its_shape_functions_say() {
         (normal, normal.dot(apex))
     };
     let planes = [side(0, 1), side(1, 2), side(2, 3), side(3, 0), (-DVec3::Z, 0.0)];
-    check("pyramid", against_integral(&tracer, &matter, &planes, &[], value), 1e-8);
+    let step = transfer(&[(0.4, [0.9, 0.2, 0.1], 0.1), (0.4, [0.1, 0.8, 0.3], 0.4)], 0.4);
+    for (what, matter) in [("bands", wild(0.4)), ("one step", step)] {
+        let tracer = GridTracer::new(&grid, &nodes.to_vec().into(), &matter).unwrap();
+        let error = against_integral(&tracer, &matter, &planes, &[], value);
+        check(&format!("pyramid, {what}"), error, 1e-8);
+    }
 }
 
 #[test]
