@@ -336,7 +336,8 @@ impl<S: Simd> Course<S> {
         let crosses = beyond & !is_cut & self.active;
         let width = reach(simd, &self.cubic, self.span, [u_end, target], crosses | is_cut);
         // Beside an outlier bands are passed in less than rounding. Yet not in nothing.
-        let width = (crosses & self.is_huge).select(width.max((target - u).abs() / self.steepest), width);
+        let least = (target - u).abs() / self.steepest;
+        let width = (crosses & self.is_huge & least.simd_le(1.0)).select(width.max(least), width);
         self.shallow(simd, Interval { width, target, crosses, is_cut })
     }
 

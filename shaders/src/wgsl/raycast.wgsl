@@ -117,7 +117,10 @@ const CELLS_MASK: u32 = 1023;
 
 struct Ray {
     start: vec3f,
+    // Without components of 0.
     direction: vec3f,
+    // With them.
+    motion: vec3f,
     inverse: vec3f,
     // 1 along axes where the ray rises, 0 where it falls.
     rising: vec3f,
@@ -172,12 +175,13 @@ fn ray_of_pixel(pixel: vec2u) -> Ray {
     let at = vec2f(pixel) + 0.5;
     let way = frame.toward + at.x * frame.toward_dx + at.y * frame.toward_dy;
     let toward = normalize(way);
-    let rising = toward >= vec3f(0.0);
-    // The volume is closed: rays in its faces, but for rounding, run inside of it.
     let place = frame.origin + at.x * frame.origin_dx + at.y * frame.origin_dy;
-    let inside = clamp(place, vec3f(0.0), frame.cells * 0.9999999);
-    let is_in_face = (abs(toward) < vec3f(1e-12)) & (abs(place - inside) <= 1e-6 * frame.cells);
-    let start = select(place, inside, is_in_face);
+    // A ray that stands still along an axis and, but for rounding, in a plane of samples is in that plane: the volume is
+    // closed. It creeps away from the face behind which nothing is.
+    let is_still = abs(toward) < vec3f(1e-12);
+    let nearest = clamp(round(place), vec3f(0.0), frame.cells);
+    let start = select(place, nearest, is_still & (abs(place - nearest) <= 1e-6 * frame.cells));
+    let rising = select(toward >= vec3f(0.0), start < frame.cells, is_still);
     // No component is zero, so that no face is infinitely far or NaN away.
     let direction = select(min(toward, vec3f(-1e-12)), max(toward, vec3f(1e-12)), rising);
     let depth_per_t = length(direction * frame.depth_per_cell);
@@ -188,7 +192,8 @@ fn ray_of_pixel(pixel: vec2u) -> Ray {
         end = (surface.a + frame.surface_offset) * frame.cells_per_depth * length(way);
         behind = surface.rgb;
     }
-    return Ray(start, direction, 1.0 / direction, select(vec3f(0.0), vec3f(1.0), rising), depth_per_t, end, behind);
+    let motion = select(direction, vec3f(0.0), is_still);
+    return Ray(start, direction, motion, 1.0 / direction, select(vec3f(0.0), vec3f(1.0), rising), depth_per_t, end, behind);
 }
 
 // Where a gather reads the corners of a cell in the slice z of a brick.
@@ -493,7 +498,8 @@ fn add_exactly(light: ptr<function, Light>, field: vec4f, ends: vec2f, range: ve
         if is_cut || is_beyond {
             width = reach(cubic, span, u_end, goal);
             // Beside an outlier bands are passed in less than rounding. Yet not in nothing.
-            width = select(width, max(width, abs(goal - cubic.x) / steepest), is_huge && !is_cut);
+            let least = abs(goal - cubic.x) / steepest;
+            width = select(width, max(width, least), is_huge && !is_cut && least <= 1.0);
         }
         let part = shallow_width(band, cubic, width, goal, length);
         let is_deep = part < width;
@@ -575,7 +581,7 @@ fn light_along(ray: Ray) -> Light {
         let far_middle = texel_at(corners, (origin + 0.5 * (t + t_far) * ray.direction) * inverse_scale);
         let far = texel_at(corners, (origin + t_far * ray.direction) * inverse_scale);
         let bend = abs(2.0 * far_middle - end.texel - far);
-        let way = (t_far - t) * inverse_scale * ray.direction;
+        let way = (t_far - t) * inverse_scale * ray.motion;
         let twist = abs(corners.rise.w - corners.rise.z - corners.rise.x + corners.rise.y) * abs(way.x * way.y * way.z);
         let light_behind = select(0.0, light.transmittance, is_matter && !is_start);
         let far_depth = 0.5 * (t_far - t) * ray.depth_per_t;
@@ -602,7 +608,7 @@ fn light_along(ray: Ray) -> Light {
             let range = vec2f(
                 min(min(least.x, least.y), min(least.z, least.w)),
                 max(max(greatest.x, greatest.y), max(greatest.z, greatest.w)));
-            let cubic = cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.direction);
+            let cubic = cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.motion);
             add_exactly(&light, cubic, vec2f(end.texel, last), range, length);
             light.doubt += EXACT_DOUBT * (light_behind - light.transmittance);
         } else {
