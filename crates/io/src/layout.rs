@@ -161,19 +161,6 @@ impl Layout {
     }
 }
 
-/// The first three axes of any number of them: fewer are filled up with 1, of more the first volume is
-/// taken, with a note.
-pub(crate) fn first_volume(field: &str, dims: &[u64], notes: &mut Vec<String>) -> Result<[u64; 3], Problem> {
-    if dims.contains(&0) {
-        return Err(Problem::field(field, format!("{dims:?}"), "at least 1 along each axis"));
-    }
-    let volumes = dims.iter().skip(3).fold(1u64, |volumes, &n| volumes.saturating_mul(n));
-    if volumes > 1 {
-        notes.push(format!("the file holds {volumes} volumes; the first is used"));
-    }
-    Ok(std::array::from_fn(|axis| dims.get(axis).copied().unwrap_or(1)))
-}
-
 /// The spacing to use: the caller's, else the file's if it is usable. A negative one loses its sign, with
 /// a note; that of an axis of one sample does not matter and becomes 1 where it is unusable.
 pub(crate) fn checked_spacing(

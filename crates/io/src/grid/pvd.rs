@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::{GridFile, GridFormat, GridOptions, Part, format_of, join, pvtu, with_parts_of};
 use crate::bytes::load;
 use crate::error::{Problem, ReadError, quoted};
-use crate::vtk_xml::{Document, Element};
+use crate::vtk_xml::{Document, Element, XmlBytes};
 
 /// One time of a series, and where its grid is.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl TimeStep {
     ) -> Result<R, Problem> {
         match &self.files[..] {
             [file] => {
-                let read = format_of(file).and_then(|format| with_parts_of(file, format, run));
+                let read = format_of(file).and_then(|format| with_parts_of(file, format, None, run));
                 read.map_err(|problem| problem.of_part(file))
             }
             files => pvtu::with_files(files, |parts| run(GridFormat::Pvtu, parts)),
@@ -67,7 +67,7 @@ pub(super) fn with_first_step<R>(
 }
 
 fn steps(path: &Path) -> Result<Vec<TimeStep>, Problem> {
-    let bytes = load(path)?;
+    let bytes = XmlBytes::new(load(path)?)?;
     let document = Document::parse(&bytes, "Collection")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut entries: Vec<(f64, PathBuf)> =

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::{Part, vtu};
-use crate::bytes::{FileBytes, load};
+use crate::bytes::load;
 use crate::error::Problem;
-use crate::vtk_xml::Document;
+use crate::vtk_xml::{Document, XmlBytes};
 
 /// A grid of more pieces is refused: all of them are in memory or mapped at once.
 const MAX_PIECES: usize = 4096;
@@ -24,9 +24,9 @@ pub(super) fn with_files<R>(
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
     let of_part = |path: &PathBuf, problem: Problem| problem.of_part(path);
-    let files: Vec<FileBytes> = paths
+    let files: Vec<XmlBytes> = paths
         .iter()
-        .map(|path| load(path).map_err(|problem| of_part(path, problem)))
+        .map(|path| load(path).and_then(XmlBytes::new).map_err(|problem| of_part(path, problem)))
         .collect::<Result<_, _>>()?;
     let documents: Vec<Document> = paths
         .iter()
@@ -44,7 +44,7 @@ pub(super) fn with_files<R>(
 }
 
 fn piece_paths(path: &Path) -> Result<Vec<PathBuf>, Problem> {
-    let bytes = load(path)?;
+    let bytes = XmlBytes::new(load(path)?)?;
     let document = Document::parse(&bytes, "PUnstructuredGrid")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let source = |piece: &crate::vtk_xml::Element| {

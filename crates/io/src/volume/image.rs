@@ -42,6 +42,13 @@ pub(super) fn check_plausible(
     Ok(required as u64)
 }
 
+/// Numbers of 1 to 8 bits, whose rows start at whole bytes, as bytes.
+pub(super) fn unpacked(packed: &[u8], bits: usize, width: usize) -> Vec<u8> {
+    let rows = packed.chunks_exact((width * bits).div_ceil(8).max(1));
+    let number = |row: &[u8], first: usize| row[first / 8] >> (8 - bits - first % 8) & (u8::MAX >> (8 - bits));
+    rows.flat_map(|row| (0..width).map(move |x| number(row, x * bits))).collect()
+}
+
 /// Decodes a JPEG image: gray, or colour as RGB.
 pub(super) fn decode_jpeg(bytes: &[u8], max_bytes: u64) -> Result<Page, Problem> {
     // The decoder forgives a scan that stops early, so look for the end of image after the last scan.
@@ -72,4 +79,17 @@ pub(super) fn decode_jpeg(bytes: &[u8], max_bytes: u64) -> Result<Page, Problem>
     }
     let sample = if is_gray { SampleType::U8 } else { SampleType::Rgb8 };
     Ok(Page { width, height, sample, bytes: pixels })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_few_bits_start_each_row_at_a_byte() {
+        assert_eq!(unpacked(&[0b1010_0000, 0b0100_0000], 1, 3), [1, 0, 1, 0, 1, 0]);
+        assert_eq!(unpacked(&[0x12, 0x30], 4, 3), [1, 2, 3]);
+        assert_eq!(unpacked(&[0b1101_1000], 2, 3), [3, 1, 2]);
+        assert_eq!(unpacked(&[7, 9], 8, 2), [7, 9]);
+    }
 }

@@ -39,7 +39,7 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Proble
         }
         samples
     };
-    Ok(Decoded { dims: layout.dims, spacing, samples, array: None, notes })
+    Ok(Decoded::new(layout.dims, spacing, samples, notes))
 }
 
 /// Dims and type as the name gives them: `.._256x256x128_uint8.raw`.

@@ -2,7 +2,7 @@
 //!
 //! Row 0 of an image is y = 0, the first slice z = 0. Slices come in natural order of their names: runs of
 //! digits compare as numbers, so `slice10` follows `slice9`. All must have one size and type. Spacing is 1
-//! unless the caller says otherwise.
+//! unless a TIFF of all slices or the caller says otherwise.
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,8 @@ use bytemuck::Pod;
 use volery_scene::{Sample, SampleType, Samples};
 
 use super::image::{Page, decode_jpeg};
-use super::{Decoded, Format, lower_name, png, tiff};
+use super::tiff::{self, Scale};
+use super::{Decoded, Format, lower_name, png};
 use crate::bytes::load;
 use crate::error::Problem;
 use crate::layout::{ByteOrder, Layout, checked_spacing, for_sample_type};
@@ -44,6 +45,8 @@ pub(super) fn read_folder(path: &Path, options: &ReadOptions) -> Result<Decoded,
     }
     for (file, format) in slices {
         stack.add_file(&file, format).map_err(|problem| problem.of_part(&file))?;
+        // Distances of one slice say nothing of the next.
+        stack.scale.spacing = None;
     }
     stack.finish()
 }
@@ -105,30 +108,32 @@ struct Stack<'a> {
     num_pages: u64,
     values: Box<dyn Grow>,
     notes: Vec<String>,
+    /// What the file says of distances and directions; nothing for a folder, whose files know no distance of slices.
+    scale: Scale,
 }
 
 impl<'a> Stack<'a> {
     fn new(options: &'a ReadOptions) -> Self {
-        Self { options, shape: None, num_pages: 0, values: Box::new(Vec::<u8>::new()), notes: Vec::new() }
+        let values = Box::new(Vec::<u8>::new());
+        Self { options, shape: None, num_pages: 0, values, notes: Vec::new(), scale: Scale::default() }
     }
 
     fn add_file(&mut self, path: &Path, format: Format) -> Result<(), Problem> {
         let bytes = load(path)?;
         let max_bytes = self.options.max_bytes;
+        let mut notes = Vec::new();
         match format {
-            Format::Jpeg => self.add(decode_jpeg(&bytes, max_bytes)?),
-            Format::Png => {
-                let mut notes = Vec::new();
-                let page = png::decode(&bytes, max_bytes, &mut notes)?;
-                for note in notes {
-                    if !self.notes.contains(&note) {
-                        self.notes.push(note);
-                    }
-                }
-                self.add(page)
+            Format::Jpeg => self.add(decode_jpeg(&bytes, max_bytes)?)?,
+            Format::Png => self.add(png::decode(&bytes, max_bytes, png::Use::Samples, &mut notes)?)?,
+            _ => {
+                self.scale =
+                    tiff::read_slices(&bytes, self.options, &mut notes, &mut |page| self.add(page))?;
             }
-            _ => tiff::for_each_page(&bytes, max_bytes, &mut |page| self.add(page)),
         }
+        // The slices of a folder often say the same.
+        notes.retain(|note| !self.notes.contains(note));
+        self.notes.append(&mut notes);
+        Ok(())
     }
 
     fn add(&mut self, page: Page) -> Result<(), Problem> {
@@ -157,9 +162,12 @@ impl<'a> Stack<'a> {
 
     fn finish(mut self) -> Result<Decoded, Problem> {
         let layout = self.layout(self.options)?;
-        let spacing = checked_spacing("spacing", [1.0; 3], layout.dims, self.options, &mut self.notes)?;
+        let spacing = self.scale.spacing.unwrap_or([1.0; 3]);
+        let spacing = checked_spacing("spacing", spacing, layout.dims, self.options, &mut self.notes)?;
         let samples = self.values.finish();
-        Ok(Decoded { dims: layout.dims, spacing, samples, array: None, notes: self.notes })
+        let mut decoded = Decoded::new(layout.dims, spacing, samples, self.notes);
+        decoded.placement = self.scale.placement(layout.dims, spacing);
+        Ok(decoded)
     }
 }
 
