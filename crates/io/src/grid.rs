@@ -176,6 +176,10 @@ trait Piece {
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
+    /// Why an array of the file is not among those that are offered, if it is in the file.
+    fn check_left_out(&self, _name: &str) -> Result<(), Problem> {
+        Ok(())
+    }
     fn points(&self) -> Result<Vec<DVec3>, Problem>;
     /// All cells, which may have `max_nodes` nodes together.
     fn cells(&self, max_nodes: u64) -> Result<PieceCells, Problem>;
@@ -307,7 +311,9 @@ fn format_by_name(path: &Path) -> Option<GridFormat> {
     // What follows numbers restarts and parts of a run: `run.e-s002`, `run.e.4.0`.
     let is_numbered = |(_, rest): (&str, &str)| {
         let rest = rest.strip_prefix("-s").or_else(|| rest.strip_prefix('.'));
-        rest.is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.'))
+        rest.is_some_and(|rest| {
+            !rest.is_empty() && rest.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.')
+        })
     };
     by_ending.or_else(|| name.rsplit_once(".e").is_some_and(is_numbered).then_some(GridFormat::Exodus))
 }

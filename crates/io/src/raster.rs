@@ -59,7 +59,9 @@ enum Take {
     One(u64),
     Magnitude,
     /// The first bytes, and how far their bits are shifted down.
-    Color { shift: u32 },
+    Color {
+        shift: u32,
+    },
 }
 
 /// An array of which it is settled what is read.
@@ -98,7 +100,8 @@ impl Array<'_> {
             return Err(Problem::field(self.field, format!("{sizes:?}"), "at least 1 along each axis"));
         }
         let axes = with_roles(&self.axes);
-        let product = |role| axes.iter().filter(|axis| axis.1 == role).fold(1, |n: u64, axis| n.saturating_mul(axis.0));
+        let product =
+            |role| axes.iter().filter(|axis| axis.1 == role).fold(1, |n: u64, axis| n.saturating_mul(axis.0));
         let (channels, volumes) = (product(Role::Channel), product(Role::Volume));
         let take = self.take(channels, options, notes)?;
         let volume = wanted_volume(volumes, options, notes)?;
@@ -108,7 +111,8 @@ impl Array<'_> {
         let layout = Layout::new(self.field, dims, sample, self.order, options)?;
         let total = sizes.iter().try_fold(1_u64, |total, &size| total.checked_mul(size));
         let total = total.filter(|total| total.checked_mul(8).is_some());
-        let total = total.ok_or_else(|| Problem::field(self.field, format!("{sizes:?}"), "fewer than 2^61 numbers"))?;
+        let total = total
+            .ok_or_else(|| Problem::field(self.field, format!("{sizes:?}"), "fewer than 2^61 numbers"))?;
         Ok(self.raster(axes, layout, take, volume, total))
     }
 
@@ -142,7 +146,14 @@ impl Array<'_> {
         }
     }
 
-    fn raster(&self, axes: Vec<(u64, Role)>, layout: Layout, take: Take, mut volume: u64, total: u64) -> Raster {
+    fn raster(
+        &self,
+        axes: Vec<(u64, Role)>,
+        layout: Layout,
+        take: Take,
+        mut volume: u64,
+        total: u64,
+    ) -> Raster {
         let mut step = 1;
         let mut walked: Vec<Walked> = Vec::new();
         for (size, role) in axes {
@@ -183,7 +194,11 @@ pub(crate) fn channel_note(channel: usize, channels: u64) -> String {
 }
 
 /// Which of several volumes is read.
-pub(crate) fn wanted_volume(volumes: u64, options: &ReadOptions, notes: &mut Vec<String>) -> Result<u64, Problem> {
+pub(crate) fn wanted_volume(
+    volumes: u64,
+    options: &ReadOptions,
+    notes: &mut Vec<String>,
+) -> Result<u64, Problem> {
     match options.time_step {
         None => {
             if volumes > 1 {
@@ -320,14 +335,25 @@ impl Raster {
     ) -> Result<Samples, Problem> {
         let run = Run { raster: self, skip, count };
         let samples: Samples = match (self.take, self.layout.sample) {
-            (Take::Color { shift }, SampleType::Rgb8) => {
-                run.place(numbers, |slot: &mut [u8; 3], channel, value: T| slot[channel] = value.byte(shift))?.into()
-            }
-            (Take::Color { shift }, _) => {
-                run.place(numbers, |slot: &mut [u8; 4], channel, value: T| slot[channel] = value.byte(shift))?.into()
-            }
+            (Take::Color { shift }, SampleType::Rgb8) => run
+                .place(numbers, |slot: &mut [u8; 3], channel, value: T| slot[channel] = value.byte(shift))?
+                .into(),
+            (Take::Color { shift }, _) => run
+                .place(numbers, |slot: &mut [u8; 4], channel, value: T| slot[channel] = value.byte(shift))?
+                .into(),
             (Take::Magnitude, SampleType::F32) => {
-                let add = |slot: &mut f32, _, value: T| *slot = f64::from(*slot).hypot(value.real()) as f32;
+                // Where components lie side by side, only their sum is rounded.
+                let is_side_by_side = self.axes.first().is_some_and(|axis| axis.role == Role::Channel);
+                let mut length = 0.0;
+                let add = |slot: &mut f32, channel, value: T| {
+                    let before = match channel {
+                        0 => 0.0,
+                        _ if is_side_by_side => length,
+                        _ => f64::from(*slot),
+                    };
+                    length = before.hypot(value.real());
+                    *slot = length as f32;
+                };
                 run.place(numbers, add)?.into()
             }
             (Take::Magnitude, _) => {
@@ -336,8 +362,14 @@ impl Raster {
             (Take::One(_), _) => self.one(&run, numbers)?,
         };
         let is_whole = matches!(self.scalar, Scalar::U64 | Scalar::I64);
-        if is_whole && for_samples!(&samples, |values| values.iter().any(|value| value.channel(0).abs() >= INEXACT_FROM)) {
-            notes.push("whole numbers of 64 bits from 2^53 on are rounded to the nearest that f64 holds".to_owned());
+        if is_whole
+            && for_samples!(&samples, |values| values
+                .iter()
+                .any(|value| value.channel(0).abs() >= INEXACT_FROM))
+        {
+            notes.push(
+                "whole numbers of 64 bits from 2^53 on are rounded to the nearest that f64 holds".to_owned(),
+            );
         }
         Ok(samples)
     }

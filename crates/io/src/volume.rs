@@ -171,7 +171,9 @@ impl Decoded {
                     notes.extend(Orientation::of(&world_from_index, of_file).note());
                     (grid, world) = (placed, of_file);
                 }
-                Err(_) => notes.push("the axes of the file span no space; its orientation is not used".to_owned()),
+                Err(_) => {
+                    notes.push("the axes of the file span no space; its orientation is not used".to_owned())
+                }
             }
         }
         Ok(Volume { grid, format, array, world, display_range, notes })
@@ -291,7 +293,9 @@ fn magic_format(head: &[u8]) -> Option<Format> {
 pub(crate) fn is_vtk_xml(head: &[u8], name: &str) -> bool {
     let head = String::from_utf8_lossy(head);
     let root = head.split_once("<VTKFile").map(|(_, root)| root.split('>').next().unwrap_or_default());
-    root.is_some_and(|root| ['"', '\''].into_iter().any(|quote| root.contains(&format!("{quote}{name}{quote}"))))
+    root.is_some_and(|root| {
+        ['"', '\''].into_iter().any(|quote| root.contains(&format!("{quote}{name}{quote}")))
+    })
 }
 
 /// The name of a file in lower case; bytes that are not UTF-8 become replacement characters.

@@ -44,7 +44,8 @@ pub(super) fn with_parts<R>(
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
     if bytes.starts_with(b"\x89HDF") {
-        return Err(Problem::field("format", "netCDF-4 (HDF5)", "Exodus II in netCDF-3 (classic)"));
+        let expected = "Exodus II in netCDF-3 (classic), as 'nccopy -k cdf5' makes it";
+        return Err(Problem::field("format", "netCDF-4 (HDF5)", expected));
     }
     let file = NcFile::from_bytes(bytes).map_err(|error| Problem::damaged("the netCDF header", error))?;
     let mut exodus = Exodus::new(file, bytes.len() as u64)?;
@@ -255,7 +256,10 @@ impl Piece for Exodus {
         several
             .then(|| {
                 let last = self.num_steps - 1;
-                format!("the file has {} time steps; the first is used (another, 0 to {last}, can be chosen)", self.num_steps)
+                format!(
+                    "the file has {} time steps; the first is used (another, 0 to {last}, can be chosen)",
+                    self.num_steps
+                )
             })
             .into_iter()
             .collect()

@@ -110,6 +110,9 @@ fn choose(
     if let Some(name) = wanted {
         let on = |place| arrays.iter().find(move |a| a.array.place == place && a.array.name == name);
         let found = on(Place::Points).or_else(|| on(Place::Cells));
+        if found.is_none() {
+            parts.iter().try_for_each(|part| part.run(|piece| piece.check_left_out(name)))?;
+        }
         return found.map(|found| Some(found.array.clone())).ok_or_else(|| {
             let names: Vec<_> = arrays.iter().map(|array| array.array.name.as_str()).collect();
             Problem::field("array", quoted(name), format!("one of {}", quoted(names.join(", "))))
@@ -247,7 +250,8 @@ impl Joined {
     fn add(&mut self, piece: &dyn Piece, array: Option<&GridArray>) -> Result<(), Problem> {
         let cells = piece.cells(self.nodes_left)?;
         self.nodes_left -= (cells.nodes.len() as u64).min(self.nodes_left);
-        let ghosts = Ghosts { cells: ghost_bits(piece, Place::Cells)?, points: ghost_bits(piece, Place::Points)? };
+        let ghosts =
+            Ghosts { cells: ghost_bits(piece, Place::Cells)?, points: ghost_bits(piece, Place::Points)? };
         let (points, mut values) = (piece.points()?, None);
         if let Some(array) = array {
             values = Some(magnitudes(piece, array)?);

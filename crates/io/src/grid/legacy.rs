@@ -117,8 +117,7 @@ impl<'a> Legacy<'a> {
 
     fn lattice(&mut self, keyword: &str, scanner: &mut Scanner<'a>) -> Result<(), Problem> {
         if keyword != "DIMENSIONS" {
-            let list =
-                if keyword == "ORIGIN" { &mut self.lattice.origin } else { &mut self.lattice.spacing };
+            let list = if keyword == "ORIGIN" { &mut self.lattice.origin } else { &mut self.lattice.spacing };
             for number in list {
                 *number = scanner.number(keyword)?;
             }
@@ -129,10 +128,12 @@ impl<'a> Legacy<'a> {
             *size = scanner.count(keyword)?;
         }
         let shown = || quoted(dims.map(|n| n.to_string()).join(" "));
-        let product = |each: fn(usize) -> usize| dims.iter().try_fold(1_usize, |all, &n| all.checked_mul(each(n)));
+        let product =
+            |each: fn(usize) -> usize| dims.iter().try_fold(1_usize, |all, &n| all.checked_mul(each(n)));
         let num_points = product(|n| n).filter(|&points| points > 0 && points <= isize::MAX as usize);
-        self.num_points =
-            num_points.ok_or_else(|| Problem::field(keyword, shown(), "at least 1 sample along each axis, that can be addressed"))?;
+        self.num_points = num_points.ok_or_else(|| {
+            Problem::field(keyword, shown(), "at least 1 sample along each axis, that can be addressed")
+        })?;
         // A flat axis has one layer of cells.
         self.num_cells = product(|n| (n - 1).max(1)).unwrap_or(0);
         self.lattice.dims = Some(dims);

@@ -16,8 +16,8 @@ pub(super) struct VtuPiece<'a> {
     arrays: Vec<PieceArray>,
     /// The elements of the arrays, and the type of their numbers.
     elements: Vec<(&'a Element<'a>, Scalar)>,
-    /// What is said of arrays that hold no numbers.
-    notes: Vec<String>,
+    /// Arrays that hold no numbers, by their names.
+    others: Vec<(String, &'a Element<'a>)>,
 }
 
 /// Opens the content of a file and runs something on its pieces.
@@ -54,7 +54,7 @@ impl<'a> VtuPiece<'a> {
             num_cells,
             arrays: Vec::new(),
             elements: Vec::new(),
-            notes: Vec::new(),
+            others: Vec::new(),
         };
         for (section, place) in [("PointData", Place::Points), ("CellData", Place::Cells)] {
             for section in document.children(element, section) {
@@ -76,7 +76,7 @@ impl<'a> VtuPiece<'a> {
                     self.arrays.push(PieceArray { array, is_active });
                     self.elements.push((element, scalar));
                 }
-                Err(problem) => self.notes.push(format!("left out: {}", problem.of_array(name))),
+                Err(_) => self.others.push((name, element)),
             }
         }
         Ok(())
@@ -143,7 +143,20 @@ fn number_type(element: &Element) -> Result<(Scalar, usize), Problem> {
 
 impl Piece for VtuPiece<'_> {
     fn notes(&self) -> Vec<String> {
-        self.notes.clone()
+        let why = |(name, element): &(String, &Element)| {
+            let problem = number_type(element).err()?.of_array(name);
+            Some(format!("array left out: {problem}"))
+        };
+        self.others.iter().filter_map(why).collect()
+    }
+
+    fn check_left_out(&self, name: &str) -> Result<(), Problem> {
+        match self.others.iter().find(|(own, _)| own == name) {
+            Some((name, element)) => {
+                number_type(element).map(|_| ()).map_err(|problem| problem.of_array(name))
+            }
+            None => Ok(()),
+        }
     }
 
     fn num_points(&self) -> u64 {

@@ -143,7 +143,8 @@ impl Statements<'_> {
                 add(&self.counts.vertices, 1);
                 // Three numbers, maybe a fourth; what comes after three and is more than one is a colour.
                 let kept = if num_words > 5 { 4 } else { num_words };
-                *statement = [&b"v"[..]].into_iter().chain(words().take(kept).skip(1)).collect::<Vec<_>>().join(&b' ');
+                *statement =
+                    [&b"v"[..]].into_iter().chain(words().take(kept).skip(1)).collect::<Vec<_>>().join(&b' ');
                 true
             }
             b"f" => {

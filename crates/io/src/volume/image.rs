@@ -45,7 +45,8 @@ pub(super) fn check_plausible(
 /// Numbers of 1 to 8 bits, whose rows start at whole bytes, as bytes.
 pub(super) fn unpacked(packed: &[u8], bits: usize, width: usize) -> Vec<u8> {
     let rows = packed.chunks_exact((width * bits).div_ceil(8).max(1));
-    let number = |row: &[u8], first: usize| row[first / 8] >> (8 - bits - first % 8) & (u8::MAX >> (8 - bits));
+    let number =
+        |row: &[u8], first: usize| row[first / 8] >> (8 - bits - first % 8) & (u8::MAX >> (8 - bits));
     rows.flat_map(|row| (0..width).map(move |x| number(row, x * bits))).collect()
 }
 

@@ -84,7 +84,8 @@ impl Region {
     /// Whether all of it is part of another region.
     fn is_in(&self, whole: &Self) -> bool {
         (0..3).all(|axis| {
-            let start = self.low[axis].checked_sub(whole.low[axis]).and_then(|start| u64::try_from(start).ok());
+            let start =
+                self.low[axis].checked_sub(whole.low[axis]).and_then(|start| u64::try_from(start).ok());
             start.is_some_and(|start| start.saturating_add(self.dims[axis]) <= whole.dims[axis])
         })
     }
@@ -152,7 +153,8 @@ impl<'a> ImageData<'a> {
         let arrays = &self.pieces[0].arrays;
         let offered = || arrays.iter().filter(|array| !array.is_ghost());
         if let Some(name) = wanted {
-            let named = |on_cells| offered().find(|a| a.on_cells == on_cells && a.name.as_deref() == Some(name));
+            let named =
+                |on_cells| offered().find(|a| a.on_cells == on_cells && a.name.as_deref() == Some(name));
             return named(false).or_else(|| named(true)).ok_or_else(|| {
                 let names: Vec<_> = offered().filter_map(|array| array.name.as_deref()).collect();
                 Problem::field("array", quoted(name), format!("one of {}", quoted(names.join(", "))))
@@ -190,7 +192,8 @@ impl<'a> ImageData<'a> {
             let scalar = own.known_scalar()?;
             let bytes = count.and_then(|count| count.checked_mul(scalar.bytes()));
             let count = bytes.and_then(|bytes| usize::try_from(bytes / scalar.bytes()).ok());
-            let (bytes, count) = bytes.zip(count).ok_or_else(|| Problem::field("Extent", "too large", "less"))?;
+            let (bytes, count) =
+                bytes.zip(count).ok_or_else(|| Problem::field("Extent", "too large", "less"))?;
             if (own.open)(bytes)?.vary(scalar, count, array.components as usize, &mut seen)? {
                 return Ok(true);
             }
@@ -212,7 +215,8 @@ impl<'a> ImageData<'a> {
         // The pieces are of other sizes than the whole that the caller expects; their sum must be within the limit.
         let of_pieces = ReadOptions { dims: None, ..options.clone() };
         let num_samples = |samples: &Samples| {
-            let layout = Layout::new("Extent", whole.dims, samples.sample_type(), ByteOrder::NATIVE, &of_pieces);
+            let layout =
+                Layout::new("Extent", whole.dims, samples.sample_type(), ByteOrder::NATIVE, &of_pieces);
             layout.map(|layout| layout.num_samples())
         };
         let mut joined: Option<Samples> = None;
@@ -221,7 +225,11 @@ impl<'a> ImageData<'a> {
         let of_parts = parts.iter().fold(0, |sum: u64, (_, region)| sum.saturating_add(region.num_samples()));
         if whole.num_samples() / MAX_SPARSE > of_parts {
             let expected = format!("at most {MAX_SPARSE} times the {of_parts} samples of all pieces");
-            return Err(Problem::field("samples in the box around the pieces", whole.num_samples(), expected));
+            return Err(Problem::field(
+                "samples in the box around the pieces",
+                whole.num_samples(),
+                expected,
+            ));
         }
         for (index, (piece, region)) in parts.into_iter().enumerate() {
             let mut own_notes = Vec::new();
@@ -257,7 +265,8 @@ impl<'a> ImageData<'a> {
 
     /// For each sample whether it is hidden; `None` if no piece says so.
     fn hidden(&self, whole: &Region, on_cells: bool) -> Result<Option<Vec<bool>>, Problem> {
-        let is_ghost = |array: &&ImageArray| array.is_ghost() && array.scalar.is_ok() && array.components == 1;
+        let is_ghost =
+            |array: &&ImageArray| array.is_ghost() && array.scalar.is_ok() && array.components == 1;
         if !self.pieces.iter().any(|piece| piece.arrays.iter().any(|array| is_ghost(&array))) {
             return Ok(None);
         }
@@ -394,7 +403,11 @@ fn place(
 
 /// The same samples as real numbers, some of them blank. Colours lose their light in place of that.
 fn blanked(samples: &Samples, blank: &[bool]) -> Result<Samples, Problem> {
-    fn convert<S: Sample, T>(samples: &[S], blank: &[bool], of: impl Fn(S, bool) -> T) -> Result<Vec<T>, Problem> {
+    fn convert<S: Sample, T>(
+        samples: &[S],
+        blank: &[bool],
+        of: impl Fn(S, bool) -> T,
+    ) -> Result<Vec<T>, Problem> {
         let mut values = Vec::new();
         reserve(&mut values, samples.len())?;
         values.extend(samples.iter().zip(blank).map(|(&sample, &blank)| of(sample, blank)));
@@ -407,8 +420,12 @@ fn blanked(samples: &Samples, blank: &[bool]) -> Result<Samples, Problem> {
         if blank { f64::NAN } else { sample.channel(0) }
     }
     Ok(match samples {
-        Samples::Rgb8(colors) => convert(colors, blank, |[r, g, b], blank| if blank { [0; 4] } else { [r, g, b, 255] })?.into(),
-        Samples::Rgba8(colors) => convert(colors, blank, |color, blank| if blank { [0; 4] } else { color })?.into(),
+        Samples::Rgb8(colors) => {
+            convert(colors, blank, |[r, g, b], blank| if blank { [0; 4] } else { [r, g, b, 255] })?.into()
+        }
+        Samples::Rgba8(colors) => {
+            convert(colors, blank, |color, blank| if blank { [0; 4] } else { color })?.into()
+        }
         Samples::U32(values) => convert(values, blank, double)?.into(),
         Samples::I32(values) => convert(values, blank, double)?.into(),
         Samples::F64(values) => convert(values, blank, double)?.into(),
@@ -461,7 +478,8 @@ impl ImageArray<'_> {
     }
 
     fn known_scalar(&self) -> Result<Scalar, Problem> {
-        let unknown = |found: &String| Problem::field("type of DataArray", quoted(found), "an integer or a float");
+        let unknown =
+            |found: &String| Problem::field("type of DataArray", quoted(found), "an integer or a float");
         self.scalar.as_ref().copied().map_err(unknown)
     }
 

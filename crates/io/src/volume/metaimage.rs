@@ -130,6 +130,7 @@ impl<'a> Fields<'a> {
             Some(false) => ByteOrder::Little,
         };
         let mut axes = vec![(channels, Role::Channel)];
+        axes.retain(|&(channels, _)| channels > 1);
         axes.extend(sizes.iter().map(|&size| (size, Role::Space)));
         Ok(Array { field: "DimSize", axes, scalar, order, meaning: Meaning::Components })
     }
@@ -174,13 +175,17 @@ impl<'a> Fields<'a> {
         // The numbers of an axis stand together.
         let vector = |list: &[f64]| DVec3::from_array([0, 1, 2].map(|i| list.get(i).copied().unwrap_or(0.0)));
         let directions: Vec<DVec3> = match list("TransformMatrix", matrix, rank * rank)? {
-            Some(list) => list.chunks(rank).take(rank.min(3)).map(|row| vector(&row[..rank.min(3)])).collect(),
+            Some(list) => {
+                list.chunks(rank).take(rank.min(3)).map(|row| vector(&row[..rank.min(3)])).collect()
+            }
             None => Vec::new(),
         };
         let axes = completed(&directions);
         let center = list("CenterOfRotation", self.center, rank)?.unwrap_or_default();
         if center.iter().any(|&coordinate| coordinate != 0.0) && axes != glam::DMat3::IDENTITY {
-            notes.push("CenterOfRotation is not used, as in ITK: samples are turned about the first".to_owned());
+            notes.push(
+                "CenterOfRotation is not used, as in ITK: samples are turned about the first".to_owned(),
+            );
         }
         let origin = list("Offset", offset, rank)?.unwrap_or_default();
         let axes = axes * glam::DMat3::from_diagonal(spacing);
@@ -203,7 +208,8 @@ impl<'a> Fields<'a> {
                 let words: Vec<&str> = name.split_whitespace().collect();
                 let stated = if name.starts_with("LIST") { words.get(1) } else { words.get(4) };
                 let each = stated.and_then(|word| word.parse().ok()).unwrap_or(sizes.len() - 1);
-                let num_parts = sizes.iter().skip(each).fold(1, |parts: u64, &size| parts.saturating_mul(size));
+                let num_parts =
+                    sizes.iter().skip(each).fold(1, |parts: u64, &size| parts.saturating_mul(size));
                 DataPlace::detached("ElementDataFile", path, name, &self.listed, num_parts)?
             }
         };

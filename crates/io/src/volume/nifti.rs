@@ -167,7 +167,8 @@ impl Header {
                 return Err(Problem::field("sizeof_hdr", format!("{found:?}"), expected));
             }
         };
-        let (magic, expected): (_, &[u8]) = if is_second { (&bytes[4..8], b"n+2\0") } else { (&bytes[344..], b"n+1\0") };
+        let (magic, expected): (_, &[u8]) =
+            if is_second { (&bytes[4..8], b"n+2\0") } else { (&bytes[344..], b"n+1\0") };
         if magic != expected {
             let (found, expected) = (String::from_utf8_lossy(magic), String::from_utf8_lossy(&expected[..3]));
             let expected = format!("'{expected}', header and samples in a single file");
@@ -232,9 +233,9 @@ impl Header {
             Layout::new("dim", dims, scaled_type(layout.sample), ByteOrder::NATIVE, &any_type)?;
         }
         let [_, x, y, z] = self.pixdim;
-        // The sign of a length says nothing here: orientation does.
-        let lengths = [x.abs(), y.abs(), z.abs()];
-        let spacing = checked_spacing("pixdim", lengths, layout.dims, options, &mut notes)?;
+        // The sign of a length says nothing where an orientation does.
+        let sizes = if self.placement.is_some() { [x.abs(), y.abs(), z.abs()] } else { [x, y, z] };
+        let spacing = checked_spacing("pixdim", sizes, layout.dims, options, &mut notes)?;
         Ok(Plan { raster, spacing, scaling, notes })
     }
 }
@@ -295,7 +296,8 @@ fn number_type(datatype: i16) -> Result<(Scalar, u64), Problem> {
         1280 => (Scalar::U64, 1),
         2304 => (Scalar::U8, 4),
         _ => {
-            let expected = "2, 4, 8, 16, 64, 128, 256, 512, 768, 1024, 1280 or 2304 (integers, floats, RGB, RGBA)";
+            let expected =
+                "2, 4, 8, 16, 64, 128, 256, 512, 768, 1024, 1280 or 2304 (integers, floats, RGB, RGBA)";
             return Err(Problem::field("datatype", datatype, expected));
         }
     })

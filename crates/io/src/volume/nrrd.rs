@@ -67,7 +67,8 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Proble
     let axes = fields.axes(&mut notes)?;
     let raster = fields.array(&axes)?.plan(options, &mut notes)?;
     let space: Vec<&Axis> = axes.iter().filter(|axis| axis.role == Role::Space).take(3).collect();
-    let spacing = checked_spacing("spacings", lengths(&space, &mut notes), raster.layout.dims, options, &mut notes)?;
+    let spacing =
+        checked_spacing("spacings", lengths(&space, &mut notes), raster.layout.dims, options, &mut notes)?;
     let placement = fields.placement(&space)?;
     let samples = fields.data(path, start, &axes)?.read(bytes, &raster, &mut notes)?;
     let mut decoded = Decoded::new(raster.layout.dims, spacing, samples, notes);
@@ -126,11 +127,13 @@ impl<'a> Fields<'a> {
         }
         let kinds = self.kinds.map(|kinds| kinds.split_whitespace().map(str::to_ascii_lowercase).collect());
         let kinds: Vec<String> = kinds.unwrap_or_default();
-        let kind = |axis: usize| kinds.get(axis).filter(|kind| !matches!(kind.as_str(), "???" | "none")).cloned();
+        let kind =
+            |axis: usize| kinds.get(axis).filter(|kind| !matches!(kind.as_str(), "???" | "none")).cloned();
         let steps = self.steps(dimension)?;
         let axes = sizes.iter().zip(steps).enumerate();
-        let mut axes: Vec<Axis> =
-            axes.map(|(axis, (&size, step))| Axis { size, role: Role::Space, kind: kind(axis), step }).collect();
+        let mut axes: Vec<Axis> = axes
+            .map(|(axis, (&size, step))| Axis { size, role: Role::Space, kind: kind(axis), step })
+            .collect();
         let is_silent = kinds.is_empty() && self.directions.is_none();
         for axis in &mut axes {
             axis.role = match axis.kind.as_deref() {
@@ -245,7 +248,12 @@ impl<'a> Fields<'a> {
                 DataPlace::detached("data file", path, name, &self.listed, self.num_parts(name, axes))?
             }
         };
-        Ok(Data { place, line_skip, byte_skip: text::byte_skip("byte skip", self.byte_skip, encoding)?, encoding })
+        Ok(Data {
+            place,
+            line_skip,
+            byte_skip: text::byte_skip("byte skip", self.byte_skip, encoding)?,
+            encoding,
+        })
     }
 
     /// The files that a list or pattern must name: each holds the axes up to the one that its last number says, or
@@ -289,7 +297,12 @@ fn scalar(name: &str) -> Result<Scalar, Problem> {
         "uint" | "unsigned int" | "uint32" | "uint32_t" => Scalar::U32,
         "int" | "signed int" | "int32" | "int32_t" => Scalar::I32,
         "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Scalar::U64,
-        "longlong" | "long long" | "long long int" | "signed long long" | "signed long long int" | "int64"
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
         | "int64_t" => Scalar::I64,
         "float" => Scalar::F32,
         "double" => Scalar::F64,

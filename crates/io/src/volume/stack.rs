@@ -126,8 +126,7 @@ impl<'a> Stack<'a> {
             Format::Jpeg => self.add(decode_jpeg(&bytes, max_bytes)?)?,
             Format::Png => self.add(png::decode(&bytes, max_bytes, png::Use::Samples, &mut notes)?)?,
             _ => {
-                self.scale =
-                    tiff::read_slices(&bytes, self.options, &mut notes, &mut |page| self.add(page))?;
+                self.scale = tiff::read_slices(&bytes, self.options, &mut notes, &mut |page| self.add(page))?;
             }
         }
         // The slices of a folder often say the same.

@@ -139,7 +139,8 @@ pub(super) fn byte_skip(field: &str, text: Option<&str>, encoding: Encoding) -> 
 /// The names that a pattern such as `slice%03d.raw 1 9 2` stands for; a fourth number says of how many dimensions a
 /// slice is, which the number of files says, too. More names than `max` and one are not made.
 fn pattern(field: &str, text: &str, max: u64) -> Result<Vec<String>, Problem> {
-    let bad = || Problem::field(field, quoted(text), "a name such as 'slice%03d.raw' and two or three numbers");
+    let bad =
+        || Problem::field(field, quoted(text), "a name such as 'slice%03d.raw' and two or three numbers");
     let words: Vec<&str> = text.split_whitespace().collect();
     let first_number = words.len().saturating_sub(1).min(4);
     // The name may hold blanks: numbers are what parses at the end.
@@ -159,10 +160,16 @@ fn pattern(field: &str, text: &str, max: u64) -> Result<Vec<String>, Problem> {
         return Err(bad());
     }
     let has_zeros = format.starts_with('0');
-    let count = (last.saturating_sub(first) / step).saturating_add(1).clamp(0, max.saturating_add(1).min(1 << 20) as i64);
+    let count = (last.saturating_sub(first) / step)
+        .saturating_add(1)
+        .clamp(0, max.saturating_add(1).min(1 << 20) as i64);
     let name_of = |index: i64| {
         let number = first + index * step;
-        if has_zeros { format!("{before}{number:0width$}{after}") } else { format!("{before}{number:width$}{after}") }
+        if has_zeros {
+            format!("{before}{number:0width$}{after}")
+        } else {
+            format!("{before}{number:width$}{after}")
+        }
     };
     Ok((0..count).map(name_of).collect())
 }
@@ -248,7 +255,11 @@ impl Data {
         notes: &mut Vec<String>,
     ) -> Result<Samples, Problem> {
         let Encoding::Binary(compression) = self.encoding else {
-            return Err(Problem::field("encoding", "text", "raw or packed data where there are several files"));
+            return Err(Problem::field(
+                "encoding",
+                "text",
+                "raw or packed data where there are several files",
+            ));
         };
         let mut parts = Parts {
             data: self,
@@ -270,10 +281,12 @@ fn tail(bytes: &[u8], start: u64) -> &[u8] {
 
 /// The place after so many lines.
 fn after_lines(bytes: &[u8], start: u64, lines: u64) -> u64 {
-    (0..lines).try_fold(start, |start, _| {
-        let end = tail(bytes, start).iter().position(|&byte| byte == b'\n');
-        end.map(|end| start + end as u64 + 1)
-    }).unwrap_or(bytes.len() as u64)
+    (0..lines)
+        .try_fold(start, |start, _| {
+            let end = tail(bytes, start).iter().position(|&byte| byte == b'\n');
+            end.map(|end| start + end as u64 + 1)
+        })
+        .unwrap_or(bytes.len() as u64)
 }
 
 /// The bytes that pairs of hexadecimal digits stand for, at most so many.

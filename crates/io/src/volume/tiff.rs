@@ -65,7 +65,8 @@ pub(super) fn read_slices(
             None => Some(slice),
         };
         let expected = "slices of this file: it is one of a set of files";
-        let page = page.ok_or_else(|| Problem::field("pages that OME-XML names", "in other files", expected))?;
+        let page =
+            page.ok_or_else(|| Problem::field("pages that OME-XML names", "in other files", expected))?;
         for layer in 0..pages.shape.depth {
             let decoded = pages.layer(page, layer, what, selected.is_behind, options.max_bytes)?;
             budget = budget
@@ -116,7 +117,7 @@ impl<'a> Pages<'a> {
         directories.retain(|_| shapes.next().is_some_and(is_same));
         if directories.len() < all {
             let left_out = all - directories.len();
-            notes.push(format!("{left_out} pages of other sizes, smaller copies and masks are not used"));
+            notes.push(format!("pages left out, of other sizes, smaller copies or masks: {left_out}"));
         }
         Ok(Self { file, directories, shape })
     }
@@ -131,7 +132,10 @@ impl<'a> Pages<'a> {
             return None;
         }
         if promised < pages {
-            notes.push(format!("{} speaks of {promised} of {pages} pages; the others are not used", found.writer));
+            notes.push(format!(
+                "{} speaks of {promised} of {pages} pages; the others are not used",
+                found.writer
+            ));
         }
         notes.append(&mut found.notes);
         Some(found)
@@ -206,7 +210,8 @@ impl<'a> Pages<'a> {
         is_behind: bool,
         max_bytes: u64,
     ) -> Result<Page, Problem> {
-        let directory = if is_behind { Some(&self.directories[0]) } else { self.directories.get(page as usize) };
+        let directory =
+            if is_behind { Some(&self.directories[0]) } else { self.directories.get(page as usize) };
         let directory = directory.ok_or_else(|| {
             let expected = format!("page {page} of its text");
             Problem::field("number of pages", self.directories.len(), expected)
@@ -214,7 +219,11 @@ impl<'a> Pages<'a> {
         let shape = if is_behind { self.shape.clone() } else { Shape::of(&self.file, directory)? };
         let [width, height] = [shape.width, shape.height].map(u32::try_from);
         let (Ok(width), Ok(height)) = (width, height) else {
-            return Err(Problem::field("image size", format!("{} x {}", shape.width, shape.height), "sides below 2^32"));
+            return Err(Problem::field(
+                "image size",
+                format!("{} x {}", shape.width, shape.height),
+                "sides below 2^32",
+            ));
         };
         let bytes_each = shape.samples.saturating_mul(shape.bits.div_ceil(8)) as usize;
         check_plausible(width, height, bytes_each, self.file.bytes.len(), u64::MAX)?;
@@ -303,7 +312,10 @@ impl<'a> Pages<'a> {
             (Some(any), z) => {
                 let (x, y) = (x.unwrap_or(any), y.unwrap_or(any));
                 if z.is_none() && self.directories.len() > 1 && (x, y) != (1.0, 1.0) {
-                    notes.push("the file does not say how far slices are apart; as far as columns is taken".to_owned());
+                    notes.push(
+                        "the file does not say how far slices are apart; as far as columns is taken"
+                            .to_owned(),
+                    );
                 }
                 Some([x, y, z.unwrap_or(x)])
             }

@@ -133,7 +133,8 @@ mod tests {
 
     #[test]
     fn directions_are_read_row_by_row() {
-        let text = br#"<VTKFile type="ImageData" byte_order="LittleEndian"><ImageData WholeExtent="0 0 0 0 0 0"
+        let text =
+            br#"<VTKFile type="ImageData" byte_order="LittleEndian"><ImageData WholeExtent="0 0 0 0 0 0"
             Direction="0 1 0 -1 0 0 0 0 1"><Piece Extent="0 0 0 0 0 0"/></ImageData></VTKFile>"#;
         let document = Document::parse(text, "ImageData").unwrap();
         let image = image(&document, "ImageData", pieces(&document, None).unwrap()).unwrap();

@@ -8,8 +8,8 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::TiffError;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
 
 use super::super::image::unpacked;
 use super::WHAT;
@@ -78,9 +78,11 @@ pub(super) fn decode(
 /// What the decoder says, as what it is: not supported, or damaged.
 fn problem(error: TiffError) -> Problem {
     match error {
-        TiffError::UnsupportedError(what) => {
-            Problem::field("the TIFF file's way to store samples", what, "one that can be decoded: save it uncompressed")
-        }
+        TiffError::UnsupportedError(what) => Problem::field(
+            "the TIFF file's way to store samples",
+            what,
+            "one that can be decoded: save it uncompressed",
+        ),
         error => Problem::damaged(WHAT, error),
     }
 }
@@ -181,7 +183,8 @@ fn front(
     }
     let held = |tags: &[NewTag]| tags.iter().map(|tag| tag.3.len().next_multiple_of(8)).sum::<usize>();
     let front_bytes = 16 + 8 + 20 * (tags.len() + 1) + 8 + held(&tags) + 8 * chunks.offsets.len();
-    let places: Vec<u64> = chunks.offsets.iter().map(|place| place.saturating_add(front_bytes as u64)).collect();
+    let places: Vec<u64> =
+        chunks.offsets.iter().map(|place| place.saturating_add(front_bytes as u64)).collect();
     tags.push(longs(offsets_tag, &places));
     tags.sort_by_key(|tag| tag.0);
     let mut front = Vec::new();
@@ -237,7 +240,9 @@ impl Seek for Spliced<'_> {
         let place = match to {
             SeekFrom::Start(place) => Some(place),
             SeekFrom::Current(step) => self.position.checked_add_signed(step),
-            SeekFrom::End(step) => (self.front.len() as u64 + self.back.len() as u64).checked_add_signed(step),
+            SeekFrom::End(step) => {
+                (self.front.len() as u64 + self.back.len() as u64).checked_add_signed(step)
+            }
         };
         self.position = place.ok_or_else(|| io::Error::other("a place before the start of the file"))?;
         Ok(self.position)
@@ -247,7 +252,8 @@ impl Seek for Spliced<'_> {
 /// Red, green and blue of a colour in full-range BT.601.
 fn rgb_of([y, blue, red]: [u8; 3]) -> [u8; 3] {
     let [y, blue, red] = [f64::from(y), f64::from(blue) - 128.0, f64::from(red) - 128.0];
-    [y + 1.402 * red, y - 0.344_136 * blue - 0.714_136 * red, y + 1.772 * blue].map(|value| value.round() as u8)
+    [y + 1.402 * red, y - 0.344_136 * blue - 0.714_136 * red, y + 1.772 * blue]
+        .map(|value| value.round() as u8)
 }
 
 fn numbers(result: DecodingResult) -> Result<(Scalar, Vec<u8>), Problem> {

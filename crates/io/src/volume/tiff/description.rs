@@ -89,7 +89,10 @@ impl Description {
 /// ImageJ: lines of `name=value`; channels are the fastest, then slices, then frames.
 fn imagej(text: &str) -> Description {
     let value = |name: &str| {
-        text.lines().filter_map(|line| line.split_once('=')).find(|(own, _)| *own == name).map(|(_, value)| value.trim())
+        text.lines()
+            .filter_map(|line| line.split_once('='))
+            .find(|(own, _)| *own == name)
+            .map(|(_, value)| value.trim())
     };
     let count = |name: &str| value(name).and_then(|text| text.parse::<u64>().ok()).filter(|&n| n > 0);
     let images = count("images");
@@ -153,7 +156,11 @@ fn shaped(text: &str, samples_each: u64, channels_each: u64) -> Option<Descripti
     Some(Description {
         writer: "tifffile",
         axes,
-        spacing: [number("PhysicalSizeX"), number("PhysicalSizeY"), number("spacing").or(number("PhysicalSizeZ"))],
+        spacing: [
+            number("PhysicalSizeX"),
+            number("PhysicalSizeY"),
+            number("spacing").or(number("PhysicalSizeZ")),
+        ],
         unit: json.get("unit").and_then(Value::as_str).map(str::to_owned),
         ..Description::default()
     })
@@ -217,18 +224,24 @@ fn pixels(element: &BytesStart, channels_each: u64) -> Option<(Option<Descriptio
     if axes.len() != 3 {
         return None;
     }
-    let unit = |axis: &str| attribute(element, &format!("PhysicalSize{axis}Unit")).unwrap_or("\u{b5}m".to_owned());
-    let first = ["X", "Y", "Z"].into_iter().find(|axis| attribute(element, &format!("PhysicalSize{axis}")).is_some());
+    let unit =
+        |axis: &str| attribute(element, &format!("PhysicalSize{axis}Unit")).unwrap_or("\u{b5}m".to_owned());
+    let first =
+        ["X", "Y", "Z"].into_iter().find(|axis| attribute(element, &format!("PhysicalSize{axis}")).is_some());
     let common = first.map(unit);
     let length = |axis: &str| {
         let length: f64 = attribute(element, &format!("PhysicalSize{axis}"))?.trim().parse().ok()?;
-        let factor = meters(&unit(axis)).zip(common.as_deref().and_then(meters)).map(|(own, common)| own / common);
+        let factor =
+            meters(&unit(axis)).zip(common.as_deref().and_then(meters)).map(|(own, common)| own / common);
         // Units that are no lengths are kept if they are the same.
         let factor = factor.or((Some(unit(axis)) == common).then_some(1.0))?;
         Some(length * factor).filter(|length| length.is_finite() && *length > 0.0)
     };
     let spacing = ["X", "Y", "Z"].map(length);
-    Some((Some(Description { writer: "OME-XML", axes, spacing, unit: common, ..Description::default() }), sizes))
+    Some((
+        Some(Description { writer: "OME-XML", axes, spacing, unit: common, ..Description::default() }),
+        sizes,
+    ))
 }
 
 /// The length of a unit in metres.

@@ -115,7 +115,11 @@ impl<'a> File<'a> {
             (directory, next) = self.directory(next, &mut entries_left)?;
             directories.push(directory);
         }
-        if directories.is_empty() { Err(Problem::damaged(WHAT, "it has no directory")) } else { Ok(directories) }
+        if directories.is_empty() {
+            Err(Problem::damaged(WHAT, "it has no directory"))
+        } else {
+            Ok(directories)
+        }
     }
 
     /// One directory, and where the next one is.
@@ -147,7 +151,11 @@ impl<'a> File<'a> {
     }
 
     /// The bytes of a tag's values, its kind and their count.
-    pub(super) fn raw(&self, directory: &Directory, tag: u16) -> Result<Option<(&'a [u8], u16, usize)>, Problem> {
+    pub(super) fn raw(
+        &self,
+        directory: &Directory,
+        tag: u16,
+    ) -> Result<Option<(&'a [u8], u16, usize)>, Problem> {
         let Some(&Entry { kind, count, start }) = directory.entries.get(&tag) else { return Ok(None) };
         let bytes = count * kind_bytes(kind).unwrap_or(1);
         let values = start.checked_add(bytes).and_then(|end| self.bytes.get(start..end));
