@@ -36,7 +36,7 @@ pub struct GridOptions {
     /// The array to read; else the active scalars, else the first scalar, points before cells, that is not the same
     /// everywhere.
     pub array: Option<String>,
-    /// Which of the time steps of an Exodus file to read, from 0; else the first.
+    /// Which of the time steps of an Exodus file or a collection to read, from 0; else the first.
     pub time_step: Option<usize>,
     /// Limit of the grid in memory, in bytes.
     pub max_bytes: u64,
@@ -142,7 +142,7 @@ pub fn is_grid(path: &Path) -> bool {
     !is_structured_points(&head) && format_by_name(path).or_else(|| format_by_content(&head)).is_some()
 }
 
-/// Reads a grid from a file; of a series the first time step.
+/// Reads a grid from a file; of a series one time step.
 ///
 /// Large files are mapped into memory while they are read: they must not be changed meanwhile.
 ///
@@ -152,7 +152,7 @@ pub fn is_grid(path: &Path) -> bool {
 pub fn read_grid(path: &Path, options: &GridOptions) -> Result<GridFile, ReadError> {
     with_parts(path, options.time_step, |format, parts| {
         let (grid, array, mut notes) = join::join(parts, options)?;
-        if format == GridFormat::Pvd {
+        if format == GridFormat::Pvd && options.time_step.is_none() {
             notes.push("of a series of time steps the first is read".to_owned());
         }
         Ok(GridFile { grid, format, array, notes })
@@ -241,9 +241,15 @@ fn vtk_type(number: i64) -> Result<u8, Problem> {
 struct Part<'a> {
     path: Option<&'a Path>,
     piece: Box<dyn Piece + 'a>,
+    /// What was decided about files beside it.
+    notes: Vec<String>,
 }
 
-impl Part<'_> {
+impl<'a> Part<'a> {
+    fn new(path: Option<&'a Path>, piece: impl Piece + 'a) -> Self {
+        Self { path, piece: Box::new(piece), notes: Vec::new() }
+    }
+
     /// Runs something on the piece; what goes wrong names the file.
     fn run<R>(&self, run: impl FnOnce(&dyn Piece) -> Result<R, Problem>) -> Result<R, Problem> {
         let named = |problem: Problem| match self.path {
@@ -261,7 +267,9 @@ fn with_parts<R>(
     run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, ReadError> {
     let read = match format_of(path) {
-        Ok(GridFormat::Pvd) => pvd::with_first_step(path, |parts| run(GridFormat::Pvd, parts)),
+        Ok(GridFormat::Pvd) => {
+            pvd::with_step(path, time_step.unwrap_or(0), |parts| run(GridFormat::Pvd, parts))
+        }
         Ok(format) => with_parts_of(path, format, time_step, run),
         Err(problem) => Err(problem),
     };
@@ -275,6 +283,9 @@ fn with_parts_of<R>(
     time_step: Option<usize>,
     run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
+    if let Some(step) = time_step.filter(|&step| step > 0 && format != GridFormat::Exodus) {
+        return Err(Problem::field("time step asked for", step, "0: the file holds one"));
+    }
     match format {
         GridFormat::Vtu => vtu::with_parts(&XmlBytes::new(load(path)?)?, |parts| run(format, parts)),
         GridFormat::Pvtu => pvtu::with_parts(path, |parts| run(format, parts)),

@@ -95,12 +95,12 @@ impl FromStr for Element {
         let sample = match bare {
             "uint8" | "u1" | "uchar" => SampleType::U8,
             "int8" | "i1" => SampleType::I8,
-            "uint16" | "u2" => SampleType::U16,
-            "int16" | "i2" => SampleType::I16,
-            "uint32" | "u4" => SampleType::U32,
-            "int32" | "i4" => SampleType::I32,
-            "float32" | "f4" => SampleType::F32,
-            "float64" | "f8" => SampleType::F64,
+            "uint16" | "u16" | "u2" | "ushort" => SampleType::U16,
+            "int16" | "i16" | "i2" | "short" => SampleType::I16,
+            "uint32" | "u32" | "u4" => SampleType::U32,
+            "int32" | "i32" | "i4" => SampleType::I32,
+            "float32" | "f32" | "f4" | "float" => SampleType::F32,
+            "float64" | "f64" | "f8" | "double" => SampleType::F64,
             _ => return Err(ParseElementError { found: quoted(name) }),
         };
         Ok(Self { sample, order })

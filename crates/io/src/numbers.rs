@@ -198,22 +198,24 @@ impl Numbers<'_> {
         components: usize,
         seen: &mut Vec<f64>,
     ) -> Result<bool, Problem> {
+        // Text says only at its end how many numbers it holds; of bytes that is known.
+        let is_text = matches!(self, Self::Text(_));
         let (mut differs, mut component) = (false, 0);
         let mut look = |value: f64| {
             if seen.len() == component {
                 seen.push(value);
             }
             // A value that is blank differs from none.
-            differs = value.is_finite() && seen[component].is_finite() && value != seen[component];
+            differs |= value.is_finite() && seen[component].is_finite() && value != seen[component];
             if value.is_finite() && !seen[component].is_finite() {
                 seen[component] = value;
             }
             component = (component + 1) % components.max(1);
             // Ends the walk.
-            if differs { Err(Problem::missing("reason to read on", "none")) } else { Ok(()) }
+            if differs && !is_text { Err(Problem::missing("reason to read on", "none")) } else { Ok(()) }
         };
         let walked = for_scalar!(scalar, T => self.visit(count, |value: T| look(value.real())));
-        if differs { Ok(true) } else { walked.map(|()| false) }
+        if differs && !is_text { Ok(true) } else { walked.map(|()| differs) }
     }
 
     fn each<T: Number, U>(

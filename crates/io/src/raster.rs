@@ -208,6 +208,7 @@ pub(crate) fn wanted_volume(
         }
         Some(step) => match u64::try_from(step) {
             Ok(step) if step < volumes => Ok(step),
+            _ if volumes == 1 => Err(Problem::field("time step asked for", step, "0: the file holds one")),
             _ => Err(Problem::field("time step asked for", step, format!("0 to {}", volumes - 1))),
         },
     }

@@ -12,6 +12,7 @@ use crate::error::{Problem, ReadError, quoted};
 use crate::layout::Element;
 use crate::orientation::{Orientation, Placement, World};
 
+mod foreign;
 mod image;
 mod image_data;
 mod legacy;
@@ -243,11 +244,10 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<Format, Problem> {
     if options.dims.is_some() && options.element.is_some() {
         return Ok(Format::Raw);
     }
-    Err(Problem::field(
-        "file name",
-        quoted(&name),
-        "one that ends in .raw, .nii, .nrrd, .nhdr, .mha, .mhd, .vti, .tif, .png or .jpg, or dims and dtype",
-    ))
+    if let Some((format, way)) = foreign::format_of(&name, &head) {
+        return Err(Problem::field("format", format, way));
+    }
+    Err(Problem::field("file name", quoted(&name), foreign::ENDINGS))
 }
 
 /// The first bytes of a file, unpacked if they are gzip.

@@ -57,7 +57,7 @@ pub(super) fn with_parts<R>(
             return Err(Problem::field("time step asked for", step, expected));
         }
     }
-    run(&[Part { path: None, piece: Box::new(exodus) }])
+    run(&[Part::new(None, exodus)])
 }
 
 impl Exodus {

@@ -35,7 +35,7 @@ pub(super) fn join(
         part.run(|piece| joined.add(piece, array.as_ref()))?;
     }
     let (grid, mut notes) = joined.finish(array.as_ref())?;
-    for note in parts.iter().flat_map(|part| part.piece.notes()) {
+    for note in parts.iter().flat_map(|part| [part.notes.clone(), part.piece.notes()].concat()) {
         // Pieces of one grid often say the same.
         if !decided.contains(&note) {
             decided.push(note);

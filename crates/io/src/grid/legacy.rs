@@ -56,7 +56,7 @@ pub(super) fn with_parts<R>(
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
     let legacy = Legacy::parse(bytes, GRID_DATASET)?;
-    run(&[Part { path: None, piece: Box::new(legacy) }])
+    run(&[Part::new(None, legacy)])
 }
 
 impl<'a> Legacy<'a> {

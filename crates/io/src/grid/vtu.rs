@@ -27,7 +27,7 @@ pub(super) fn with_parts<R>(
 ) -> Result<R, Problem> {
     let document = Document::parse(bytes, "UnstructuredGrid")?;
     let pieces = pieces(&document)?.into_iter();
-    let parts: Vec<_> = pieces.map(|piece| Part { path: None, piece: Box::new(piece) }).collect();
+    let parts: Vec<_> = pieces.map(|piece| Part::new(None, piece)).collect();
     run(&parts)
 }
 

@@ -18,6 +18,24 @@ pub(crate) struct Page {
     pub(crate) bytes: Vec<u8>,
 }
 
+impl Page {
+    /// One channel of a picture if that is asked for; the others have been read as the file has them.
+    pub(super) fn channel(self, channel: Option<usize>) -> Result<Self, Problem> {
+        let channels = self.sample.channels();
+        match channel {
+            None => Ok(self),
+            Some(channel) if channel >= channels => {
+                Err(Problem::field("channel asked for", channel, format!("0 to {}", channels - 1)))
+            }
+            Some(_) if channels == 1 => Ok(self),
+            Some(channel) => {
+                let bytes = self.bytes.chunks_exact(channels).map(|color| color[channel]).collect();
+                Ok(Self { sample: SampleType::U8, bytes, ..self })
+            }
+        }
+    }
+}
+
 /// No image compression that is read here gives more than this many bytes for one.
 pub(super) const MAX_EXPANSION: u64 = 4096;
 

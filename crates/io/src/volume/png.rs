@@ -44,7 +44,8 @@ pub(super) fn decode(
     let header = decoder.read_header_info().map_err(damaged)?;
     let (width, height) = (header.width, header.height);
     let (color, depth) = (header.color_type, header.bit_depth);
-    let gray16 = (color, depth) == (ColorType::Grayscale, BitDepth::Sixteen);
+    let has_alpha = color == ColorType::GrayscaleAlpha && use_as == Use::Samples;
+    let gray16 = depth == BitDepth::Sixteen && (color == ColorType::Grayscale || has_alpha);
     let has_labels = use_as == Use::Samples && color == ColorType::Indexed;
     let mut transformations = if has_labels { Transformations::IDENTITY } else { Transformations::EXPAND };
     if has_labels {
@@ -75,8 +76,9 @@ pub(super) fn decode(
         ColorType::Rgba => SampleType::Rgba8,
         ColorType::GrayscaleAlpha if use_as == Use::Samples => {
             notes.push("the opacities beside the gray values are not used".to_owned());
-            pixels = pixels.as_chunks::<2>().0.iter().map(|&[gray, _]| gray).collect();
-            SampleType::U8
+            let each = 1 + usize::from(gray16);
+            pixels = pixels.chunks_exact(2 * each).flat_map(|pixel| &pixel[..each]).copied().collect();
+            if gray16 { SampleType::U16 } else { SampleType::U8 }
         }
         ColorType::GrayscaleAlpha => {
             pixels = pixels

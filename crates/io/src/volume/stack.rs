@@ -12,10 +12,11 @@ use volery_scene::{Sample, SampleType, Samples};
 
 use super::image::{Page, decode_jpeg};
 use super::tiff::{self, Scale};
-use super::{Decoded, Format, lower_name, png};
+use super::{Decoded, Format, foreign, lower_name, png};
 use crate::bytes::load;
 use crate::error::Problem;
 use crate::layout::{ByteOrder, Layout, checked_spacing, for_sample_type};
+use crate::raster::wanted_volume;
 use crate::volume::ReadOptions;
 
 pub(super) fn read_file(path: &Path, format: Format, options: &ReadOptions) -> Result<Decoded, Problem> {
@@ -25,22 +26,26 @@ pub(super) fn read_file(path: &Path, format: Format, options: &ReadOptions) -> R
 }
 
 pub(super) fn read_folder(path: &Path, options: &ReadOptions) -> Result<Decoded, Problem> {
-    let mut slices = Vec::new();
-    let mut others = 0;
+    let (mut slices, mut others) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(path).map_err(Problem::Io)? {
         let file = entry.map_err(Problem::Io)?.path();
         match slice_format(&file) {
             Some(format) => slices.push((file, format)),
-            None => others += 1,
+            None => others.push(file),
         }
     }
     if slices.is_empty() {
+        others.sort();
+        if let Some((format, way)) = foreign::format_of_folder(path, &others) {
+            return Err(Problem::field("format", format!("{format} in a folder"), way));
+        }
         let found = "a folder without slices";
         return Err(Problem::Kind { found, expected: "a volume file or a folder of PNG or TIFF slices" });
     }
     slices.sort_by(|(a, _), (b, _)| natural_order(a, b));
     let mut stack = Stack::new(options);
-    if others > 0 {
+    if !others.is_empty() {
+        let others = others.len();
         stack.notes.push(format!("{others} files of the folder are no PNG or TIFF and are not used"));
     }
     for (file, format) in slices {
@@ -123,8 +128,10 @@ impl<'a> Stack<'a> {
         let max_bytes = self.options.max_bytes;
         let mut notes = Vec::new();
         match format {
-            Format::Jpeg => self.add(decode_jpeg(&bytes, max_bytes)?)?,
-            Format::Png => self.add(png::decode(&bytes, max_bytes, png::Use::Samples, &mut notes)?)?,
+            Format::Jpeg => self.add_picture(decode_jpeg(&bytes, max_bytes)?)?,
+            Format::Png => {
+                self.add_picture(png::decode(&bytes, max_bytes, png::Use::Samples, &mut notes)?)?
+            }
             _ => {
                 self.scale = tiff::read_slices(&bytes, self.options, &mut notes, &mut |page| self.add(page))?;
             }
@@ -133,6 +140,12 @@ impl<'a> Stack<'a> {
         notes.retain(|note| !self.notes.contains(note));
         self.notes.append(&mut notes);
         Ok(())
+    }
+
+    /// Adds a picture, or the channel of it that is asked for; a file of one has one time.
+    fn add_picture(&mut self, page: Page) -> Result<(), Problem> {
+        wanted_volume(1, self.options, &mut self.notes)?;
+        self.add(page.channel(self.options.channel)?)
     }
 
     fn add(&mut self, page: Page) -> Result<(), Problem> {

@@ -160,11 +160,13 @@ fn pattern(field: &str, text: &str, max: u64) -> Result<Vec<String>, Problem> {
         return Err(bad());
     }
     let has_zeros = format.starts_with('0');
-    let count = (last.saturating_sub(first) / step)
+    let count = last
+        .saturating_sub(first)
+        .saturating_div(step)
         .saturating_add(1)
         .clamp(0, max.saturating_add(1).min(1 << 20) as i64);
     let name_of = |index: i64| {
-        let number = first + index * step;
+        let number = first.saturating_add(index.saturating_mul(step));
         if has_zeros {
             format!("{before}{number:0width$}{after}")
         } else {

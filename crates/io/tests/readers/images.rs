@@ -83,6 +83,14 @@ fn png_of_every_colour_type() {
         (Rgba, Eight, (0..16).collect(), SampleType::Rgba8, (0..16).map(f64::from).collect(), 0),
         (GrayscaleAlpha, Eight, vec![9, 1, 8, 2, 7, 3, 6, 4], SampleType::U8, vec![9.0, 8.0, 7.0, 6.0], 1),
         (Indexed, Eight, vec![0, 1, 1, 0], SampleType::U8, vec![0.0, 1.0, 1.0, 0.0], 1),
+        (
+            GrayscaleAlpha,
+            Sixteen,
+            vec![1, 2, 9, 9, 3, 4, 9, 9, 0, 0, 9, 9, 0, 1, 9, 9],
+            SampleType::U16,
+            vec![258.0, 772.0, 0.0, 1.0],
+            1,
+        ),
         (Indexed, One, vec![0b0100_0000, 0b1000_0000], SampleType::U8, vec![0.0, 1.0, 1.0, 0.0], 1),
         (Rgb, Sixteen, (0..24).collect(), SampleType::Rgb8, (0..12).map(|i| f64::from(2 * i)).collect(), 1),
     ];

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod axes;
+mod foreign;
 mod ghosts;
 mod grids;
 mod images;

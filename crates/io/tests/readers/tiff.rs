@@ -253,7 +253,7 @@ fn planes_apart_make_the_same_as_samples_together() {
 fn tiles_and_layers_lie_where_they_should() {
     let folder = Folder::new();
     let tags = |width, height, tile: [u64; 2]| {
-        let page = Page { is_tiled: true, ..Page::gray(width, height, 8, Vec::new()) };
+        let page = Page { is_tiled: true, chunks: Vec::new(), ..Page::gray(width, height, 8, Vec::new()) };
         page.with(&[short(322, &tile[..1]), short(323, &tile[1..])])
     };
     let value = |x: usize, y: usize, z: usize| (x + 10 * y + 100 * z) as u8;
@@ -262,8 +262,6 @@ fn tiles_and_layers_lie_where_they_should() {
         let tile = (0..4).map(|i| value(2 * tx + i % 2, 2 * ty + i / 2, 0));
         page.chunks.push(tile.collect());
     }
-    page.chunks.remove(0);
-    page.chunks.insert(0, vec![0, 1, 10, 11]);
     let volume = folder.read("a.tif", little(&[page]));
     let expected: Vec<f64> = (0..15).map(|i| f64::from(value(i % 5, i / 5, 0))).collect();
     assert_values(&volume, &expected);

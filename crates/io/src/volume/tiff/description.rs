@@ -140,6 +140,10 @@ fn shaped(text: &str, samples_each: u64, channels_each: u64) -> Option<Descripti
         within -= 1;
         left = if left.is_multiple_of(shape[within]) { left / shape[within] } else { return None };
     }
+    // Axes of one do not matter, here least of all.
+    while within > 0 && shape[within - 1] == 1 {
+        within -= 1;
+    }
     let letters: Vec<char> = json.get("axes").and_then(Value::as_str).unwrap_or_default().chars().collect();
     let has_letters = letters.len() == shape.len();
     let has_slices = letters[..within.min(letters.len())].contains(&'Z');

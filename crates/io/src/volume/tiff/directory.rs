@@ -163,13 +163,24 @@ impl<'a> File<'a> {
         Ok(Some((values.ok_or_else(outside)?, kind, count)))
     }
 
-    /// Whole numbers of a tag; none if it is not there.
-    pub(super) fn numbers(&self, directory: &Directory, tag: u16) -> Result<Vec<u64>, Problem> {
+    /// The first whole numbers of a tag, at most so many; none if it is not there.
+    pub(super) fn numbers(&self, directory: &Directory, tag: u16, most: usize) -> Result<Vec<u64>, Problem> {
+        self.part(directory, tag, 0, most)
+    }
+
+    /// At most so many whole numbers of a tag from one of them on.
+    pub(super) fn part(
+        &self,
+        directory: &Directory,
+        tag: u16,
+        first: usize,
+        most: usize,
+    ) -> Result<Vec<u64>, Problem> {
         let Some((bytes, kind, _)) = self.raw(directory, tag)? else { return Ok(Vec::new()) };
         match kind {
             1 | 3 | 4 | 13 | 16 | 18 => {
-                let each = kind_bytes(kind).unwrap_or(1);
-                Ok(bytes.chunks_exact(each).map(|value| self.order.unsigned(value)).collect())
+                let values = bytes.chunks_exact(kind_bytes(kind).unwrap_or(1)).skip(first).take(most);
+                Ok(values.map(|value| self.order.unsigned(value)).collect())
             }
             _ => Err(Problem::field(format!("type of tag {tag}"), kind, "one of whole numbers")),
         }
@@ -177,7 +188,7 @@ impl<'a> File<'a> {
 
     /// The first whole number of a tag.
     pub(super) fn first(&self, directory: &Directory, tag: u16) -> Result<Option<u64>, Problem> {
-        Ok(self.numbers(directory, tag)?.first().copied())
+        Ok(self.numbers(directory, tag, 1)?.first().copied())
     }
 
     /// A positive ratio, as resolutions are; `None` for anything else.

@@ -39,8 +39,12 @@ impl Shape {
         let needed = |tag: u16, name: &str| {
             first(tag)?.filter(|&n| n > 0).ok_or_else(|| Problem::field(name, "missing or 0", "at least 1"))
         };
+        let samples = first(tag::SAMPLES)?.unwrap_or(1);
+        if !(1..=u64::from(u16::MAX)).contains(&samples) {
+            return Err(Problem::field("SamplesPerPixel", samples, "1 to 65535"));
+        }
         let same = |tag: u16, name: &str| {
-            let values = file.numbers(directory, tag)?;
+            let values = file.numbers(directory, tag, samples as usize)?;
             match values.first() {
                 Some(first) if values.iter().any(|value| value != first) => {
                     let found = values.iter().take(8).map(u64::to_string).collect::<Vec<_>>().join(", ");
@@ -49,12 +53,8 @@ impl Shape {
                 first => Ok(first.copied().unwrap_or(1)),
             }
         };
-        let samples = first(tag::SAMPLES)?.unwrap_or(1);
-        if !(1..=u64::from(u16::MAX)).contains(&samples) {
-            return Err(Problem::field("SamplesPerPixel", samples, "1 to 65535"));
-        }
         let photometric = first(tag::PHOTOMETRIC)?.unwrap_or(if samples >= 3 { 2 } else { 1 });
-        let extra = file.numbers(directory, tag::EXTRA_SAMPLES)?;
+        let extra = file.numbers(directory, tag::EXTRA_SAMPLES, 1)?;
         // Opacity is 1 or 2; a fourth sample of colours that nothing is said of is taken for one.
         let is_unsaid = extra.is_empty() && matches!((photometric, samples), (2, 4));
         let shape = Self {
@@ -99,7 +99,7 @@ impl Shape {
         if !is_known {
             return Err(Problem::field("BitsPerSample", self.bits, expected));
         }
-        let subsampling = file.numbers(directory, tag::SUBSAMPLING)?;
+        let subsampling = file.numbers(directory, tag::SUBSAMPLING, 2)?;
         if self.photometric == 6 && self.compression != 7 && subsampling != [1, 1] {
             let expected = "1 x 1 where colours are YCbCr and no JPEG";
             return Err(Problem::field("YCbCrSubSampling", "more than 1", expected));
@@ -168,15 +168,16 @@ impl Shape {
             }
             None => (tag::STRIP_OFFSETS, tag::STRIP_COUNTS, None),
         };
-        let (offsets, counts) = (file.numbers(directory, offsets)?, file.numbers(directory, counts)?);
         let rows_per_strip = file.first(directory, tag::ROWS_PER_STRIP)?.unwrap_or(self.height);
         let rows_per_strip = rows_per_strip.clamp(1, self.height);
         let part = |first: u64, count: u64| -> Result<[Vec<u64>; 2], Problem> {
-            let short = || Problem::damaged(WHAT, "a page has fewer strips or tiles than its size needs");
-            let range = first.checked_add(count).filter(|&end| end <= offsets.len().min(counts.len()) as u64);
-            // In range: it ends with the lists.
-            let range = first as usize..range.ok_or_else(short)? as usize;
-            Ok([offsets[range.clone()].to_vec(), counts[range].to_vec()])
+            let [first, most] = [first, count].map(|n| usize::try_from(n).unwrap_or(usize::MAX));
+            let list = |tag: u16| file.part(directory, tag, first, most);
+            let (offsets, counts) = (list(offsets)?, list(counts)?);
+            if (offsets.len().min(counts.len()) as u64) < count {
+                return Err(Problem::damaged(WHAT, "a page has fewer strips or tiles than its size needs"));
+            }
+            Ok([offsets, counts])
         };
         let Some([width, height]) = tile else {
             let each = self.height.div_ceil(rows_per_strip);
