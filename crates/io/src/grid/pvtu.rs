@@ -28,7 +28,7 @@ pub(super) fn with_parts<R>(
     path: &Path,
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
-    with_files(&piece_paths(path)?, run)
+    with_pieces(&piece_paths(path)?, &[], run)
 }
 
 /// Opens files of pieces, some of which may name others, and runs something on all of them. Surfaces and the like are
@@ -51,7 +51,15 @@ pub(super) fn with_files<R>(
             return Err(Problem::field("number of pieces", paths.len(), format!("at most {MAX_PIECES}")));
         }
     }
-    let paths = &paths;
+    with_pieces(&paths, &left_out, run)
+}
+
+/// Opens files of pieces, and runs something on all of them; others were left out.
+fn with_pieces<R>(
+    paths: &[PathBuf],
+    left_out: &[&PathBuf],
+    run: impl FnOnce(&[Part]) -> Result<R, Problem>,
+) -> Result<R, Problem> {
     let of_part = |path: &PathBuf, problem: Problem| problem.of_part(path);
     let files: Vec<XmlBytes> = paths
         .iter()
