@@ -160,10 +160,8 @@ pub(crate) fn structured_points() -> Vec<Vec<u8>> {
     let text = "SCALARS s short 1\nLOOKUP_TABLE default\n1 2 3 4 5 6\nFIELD f 2\nvtkGhostType 1 6 unsigned_char\n\
                 0 2 0 0 1 0\nMETADATA\nCOMPONENT_NAMES\n\nINFORMATION 0\n\nv 3 6 float\n\
                 1 2 3 4 5 6 7 8 9 1 2 3 4 5 6 7 8 9\nCELL_DATA 2\nSCALARS c double\nLOOKUP_TABLE default\n7 8\n";
-    let binary = [
-        header("BINARY").as_bytes(),
-        b"SCALARS s unsigned_char 1\nLOOKUP_TABLE default\n\x01\x02\x03\x04\x05\x06\n",
-    ];
+    let data = b"SCALARS s unsigned_char 1\nLOOKUP_TABLE default\n\x01\x02\x03\x04\x05\x06\n";
+    let binary = [header("BINARY").into_bytes(), data.to_vec()];
     vec![header("ASCII").into_bytes().into_iter().chain(text.bytes()).collect(), binary.concat()]
 }
 
