@@ -293,7 +293,7 @@ impl Raster {
     }
 
     /// The samples from a stream of the array, of which nothing is believed.
-    pub(crate) fn from_stream(
+    pub(crate) fn in_stream(
         &self,
         source: &mut dyn Read,
         what: &'static str,
@@ -309,9 +309,9 @@ impl Raster {
     }
 
     /// The samples from the numbers of the array, which may be text.
-    pub(crate) fn from_numbers(&self, numbers: Numbers, notes: &mut Vec<String>) -> Result<Samples, Problem> {
+    pub(crate) fn in_numbers(&self, numbers: Numbers, notes: &mut Vec<String>) -> Result<Samples, Problem> {
         match numbers {
-            Numbers::Bytes(mut source, _) => self.from_stream(&mut *source, DATA, notes),
+            Numbers::Bytes(mut source, _) => self.in_stream(&mut *source, DATA, notes),
             // All of them, so that one too many is seen.
             text => self.walk_all(text, notes),
         }

@@ -463,7 +463,7 @@ impl<'a> ImagePiece<'a> {
         let (scalar, order) = (array.known_scalar()?, array.order);
         let lattice = Array { field: "Extent", axes, scalar, order, meaning: Meaning::Components };
         let raster: Raster = lattice.plan(options, notes)?;
-        raster.from_numbers((array.open)(raster.array_bytes())?, notes)
+        raster.in_numbers((array.open)(raster.array_bytes())?, notes)
     }
 }
 

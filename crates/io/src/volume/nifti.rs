@@ -65,7 +65,7 @@ fn read_gzip(path: &Path, options: &ReadOptions) -> Result<Decoded, Problem> {
     let mut plan = header.plan(options, notes)?;
     let gap = header.vox_offset - header.num_bytes as u64;
     io::copy(&mut (&mut *stream).take(gap), &mut io::sink()).map_err(damaged)?;
-    let samples = plan.raster.from_stream(&mut *stream, what, &mut plan.notes)?;
+    let samples = plan.raster.in_stream(&mut *stream, what, &mut plan.notes)?;
     has_more(&mut *stream, what)?;
     plan.finish(samples, &header)
 }

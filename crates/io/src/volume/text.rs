@@ -219,7 +219,7 @@ impl Data {
             Encoding::Binary(compression) => {
                 let what = compression.stream_name();
                 let mut stream = self.unpacked(compression, tail(&bytes, start))?;
-                let samples = raster.from_stream(&mut *stream, what, notes)?;
+                let samples = raster.in_stream(&mut *stream, what, notes)?;
                 if raster.is_read_to_its_end() && has_more(&mut *stream, what)? {
                     notes.push(EXCESS.to_owned());
                 }
@@ -228,11 +228,11 @@ impl Data {
             Encoding::Text => {
                 let text = std::str::from_utf8(tail(&bytes, start));
                 let text = text.map_err(|error| Problem::damaged("the text", error))?;
-                raster.from_numbers(Numbers::Text(text), notes)
+                raster.in_numbers(Numbers::Text(text), notes)
             }
             Encoding::Hex => {
                 let bytes = hex_bytes(tail(&bytes, start), expected)?;
-                raster.from_stream(&mut &bytes[..], "the text", notes)
+                raster.in_stream(&mut &bytes[..], "the text", notes)
             }
         }
     }
@@ -271,7 +271,7 @@ impl Data {
             current: None,
             problem: None,
         };
-        let samples = raster.from_stream(&mut parts, "the data files", notes);
+        let samples = raster.in_stream(&mut parts, "the data files", notes);
         // What went wrong in a file says more than that the stream ended.
         parts.problem.map_or(samples, Err)
     }

@@ -62,6 +62,9 @@ struct Entry {
     start: usize,
 }
 
+/// The bytes of a tag's values, their kind and count.
+type Raw<'a> = (&'a [u8], u16, usize);
+
 /// Bytes of one value of a kind; `None` for kinds that are not known.
 fn kind_bytes(kind: u16) -> Option<usize> {
     Some(match kind {
@@ -151,11 +154,7 @@ impl<'a> File<'a> {
     }
 
     /// The bytes of a tag's values, its kind and their count.
-    pub(super) fn raw(
-        &self,
-        directory: &Directory,
-        tag: u16,
-    ) -> Result<Option<(&'a [u8], u16, usize)>, Problem> {
+    pub(super) fn raw(&self, directory: &Directory, tag: u16) -> Result<Option<Raw<'a>>, Problem> {
         let Some(&Entry { kind, count, start }) = directory.entries.get(&tag) else { return Ok(None) };
         let bytes = count * kind_bytes(kind).unwrap_or(1);
         let values = start.checked_add(bytes).and_then(|end| self.bytes.get(start..end));
