@@ -71,6 +71,13 @@ pub(crate) fn load(path: &Path) -> Result<FileBytes, Problem> {
     Ok(FileBytes::Read(bytes))
 }
 
+/// Whether a file starts with these bytes.
+pub(crate) fn starts_with(path: &Path, magic: &[u8]) -> Result<bool, Problem> {
+    let mut head = Vec::new();
+    open(path)?.0.take(magic.len() as u64).read_to_end(&mut head).map_err(Problem::Io)?;
+    Ok(head == magic)
+}
+
 /// The text of a small file, such as a scene.
 pub(crate) fn load_text(path: &Path, max_bytes: u64) -> Result<String, Problem> {
     let (file, length) = open(path)?;

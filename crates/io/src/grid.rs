@@ -17,12 +17,13 @@ use volery_scene::UnstructuredGrid;
 
 use crate::bytes::{self, load};
 use crate::error::{Problem, ReadError, quoted};
-use crate::volume::lower_name;
+use crate::volume::{is_vtk_xml, lower_name};
+use crate::vtk_xml::XmlBytes;
 
 mod exodus;
 mod join;
 mod kinds;
-mod legacy;
+pub(crate) mod legacy;
 mod pvd;
 mod pvtu;
 mod vtu;
@@ -32,8 +33,11 @@ pub use pvd::{TimeStep, read_time_steps};
 /// What the caller wants of a grid.
 #[derive(Clone, Debug)]
 pub struct GridOptions {
-    /// The array to read; else the active scalars, else the first scalar, points before cells.
+    /// The array to read; else the active scalars, else the first scalar, points before cells, that is not the same
+    /// everywhere.
     pub array: Option<String>,
+    /// Which of the time steps of an Exodus file or a collection to read, from 0; else the first.
+    pub time_step: Option<usize>,
     /// Limit of the grid in memory, in bytes.
     pub max_bytes: u64,
 }
@@ -41,7 +45,7 @@ pub struct GridOptions {
 impl Default for GridOptions {
     /// The file's own array, at most 64 GiB.
     fn default() -> Self {
-        Self { array: None, max_bytes: 64 << 30 }
+        Self { array: None, time_step: None, max_bytes: 64 << 30 }
     }
 }
 
@@ -127,14 +131,18 @@ pub struct ArrayRange {
     pub range: Option<[f64; 2]>,
     /// Values that are NaN or infinite.
     pub blank: u64,
+    /// Why the values cannot be read, if they cannot; then there is no range.
+    pub problem: Option<String>,
 }
 
 /// Whether [`read_grid`] is the one to read a file: by the ending of its name, else by its first bytes.
 pub fn is_grid(path: &Path) -> bool {
-    format_by_name(path).or_else(|| format_by_content(path)).is_some()
+    let head = head_of(path);
+    // Structured points have the ending and the first line of a grid, and are a volume.
+    !is_structured_points(&head) && format_by_name(path).or_else(|| format_by_content(&head)).is_some()
 }
 
-/// Reads a grid from a file; of a series the first time step.
+/// Reads a grid from a file; of a series one time step.
 ///
 /// Large files are mapped into memory while they are read: they must not be changed meanwhile.
 ///
@@ -142,21 +150,21 @@ pub fn is_grid(path: &Path) -> bool {
 /// When the file cannot be read, is damaged, is larger than `options` allow, has no cell of volume, or is of a
 /// kind that is not supported: one line that says what was found and what was expected.
 pub fn read_grid(path: &Path, options: &GridOptions) -> Result<GridFile, ReadError> {
-    with_parts(path, |format, parts| {
+    with_parts(path, options.time_step, |format, parts| {
         let (grid, array, mut notes) = join::join(parts, options)?;
-        if format == GridFormat::Pvd {
+        if format == GridFormat::Pvd && options.time_step.is_none() {
             notes.push("of a series of time steps the first is read".to_owned());
         }
         Ok(GridFile { grid, format, array, notes })
     })
 }
 
-/// Looks at the values of every array of a file, one after the other.
+/// Looks at the values of every array of a file, one after the other. One that cannot be read says why.
 ///
 /// # Errors
-/// As [`read_grid`], cells aside.
+/// As [`read_grid`], cells and values aside.
 pub fn read_array_ranges(path: &Path, options: &GridOptions) -> Result<Vec<ArrayRange>, ReadError> {
-    with_parts(path, |_, parts| join::ranges(parts, options))
+    with_parts(path, options.time_step, |_, parts| join::ranges(parts, options))
 }
 
 /// A grid, or a part of one, whose numbers have not been read yet.
@@ -168,18 +176,24 @@ trait Piece {
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
+    /// Why an array of the file is not among those that are offered, if it is in the file.
+    fn check_left_out(&self, _name: &str) -> Result<(), Problem> {
+        Ok(())
+    }
     fn points(&self) -> Result<Vec<DVec3>, Problem>;
     /// All cells, which may have `max_nodes` nodes together.
     fn cells(&self, max_nodes: u64) -> Result<PieceCells, Problem>;
     /// The numbers of an array, the components of a value side by side.
     fn values(&self, array: usize) -> Result<Vec<f64>, Problem>;
+    /// Whether an array has a value that differs from the first, which `seen` keeps from piece to piece.
+    fn varies(&self, array: usize, seen: &mut Vec<f64>) -> Result<bool, Problem>;
 }
 
 /// An array of a piece.
-struct PieceArray {
-    array: GridArray,
+pub(crate) struct PieceArray {
+    pub(crate) array: GridArray,
     /// Whether the file names it as the one to show.
-    is_active: bool,
+    pub(crate) is_active: bool,
 }
 
 /// Cells as files have them.
@@ -227,9 +241,15 @@ fn vtk_type(number: i64) -> Result<u8, Problem> {
 struct Part<'a> {
     path: Option<&'a Path>,
     piece: Box<dyn Piece + 'a>,
+    /// What was decided about files beside it.
+    notes: Vec<String>,
 }
 
-impl Part<'_> {
+impl<'a> Part<'a> {
+    fn new(path: Option<&'a Path>, piece: impl Piece + 'a) -> Self {
+        Self { path, piece: Box::new(piece), notes: Vec::new() }
+    }
+
     /// Runs something on the piece; what goes wrong names the file.
     fn run<R>(&self, run: impl FnOnce(&dyn Piece) -> Result<R, Problem>) -> Result<R, Problem> {
         let named = |problem: Problem| match self.path {
@@ -243,11 +263,14 @@ impl Part<'_> {
 /// Opens a file and runs something on its parts.
 fn with_parts<R>(
     path: &Path,
+    time_step: Option<usize>,
     run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, ReadError> {
     let read = match format_of(path) {
-        Ok(GridFormat::Pvd) => pvd::with_first_step(path, |parts| run(GridFormat::Pvd, parts)),
-        Ok(format) => with_parts_of(path, format, run),
+        Ok(GridFormat::Pvd) => {
+            pvd::with_step(path, time_step.unwrap_or(0), |parts| run(GridFormat::Pvd, parts))
+        }
+        Ok(format) => with_parts_of(path, format, time_step, run),
         Err(problem) => Err(problem),
     };
     read.map_err(|problem| ReadError { path: path.to_owned(), problem })
@@ -257,13 +280,17 @@ fn with_parts<R>(
 fn with_parts_of<R>(
     path: &Path,
     format: GridFormat,
+    time_step: Option<usize>,
     run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
+    if let Some(step) = time_step.filter(|&step| step > 0 && format != GridFormat::Exodus) {
+        return Err(Problem::field("time step asked for", step, "0: the file holds one"));
+    }
     match format {
-        GridFormat::Vtu => vtu::with_parts(&load(path)?, |parts| run(format, parts)),
+        GridFormat::Vtu => vtu::with_parts(&XmlBytes::new(load(path)?)?, |parts| run(format, parts)),
         GridFormat::Pvtu => pvtu::with_parts(path, |parts| run(format, parts)),
         GridFormat::LegacyVtk => legacy::with_parts(&load(path)?, |parts| run(format, parts)),
-        GridFormat::Exodus => exodus::with_parts(&load(path)?, |parts| run(format, parts)),
+        GridFormat::Exodus => exodus::with_parts(&load(path)?, time_step, |parts| run(format, parts)),
         GridFormat::Pvd => Err(Problem::field("file", "a collection", "a grid of one time")),
     }
 }
@@ -272,8 +299,8 @@ fn with_parts_of<R>(
 fn format_of(path: &Path) -> Result<GridFormat, Problem> {
     // A file that cannot be opened is to say so, whatever its name is.
     bytes::open(path)?;
-    let expected = "one that ends in .vtu, .pvtu, .pvd, .vtk, .ex2, .exo or .e";
-    let format = format_by_content(path).or_else(|| format_by_name(path));
+    let expected = "one that ends in .vtu, .pvtu, .pvd, .vtk, .ex2, .exo, .e or .g";
+    let format = format_by_content(&head_of(path)).or_else(|| format_by_name(path));
     format.ok_or_else(|| Problem::field("file name", quoted(lower_name(path)), expected))
 }
 
@@ -286,28 +313,58 @@ fn format_by_name(path: &Path) -> Option<GridFormat> {
         (".vtk", GridFormat::LegacyVtk),
         (".ex2", GridFormat::Exodus),
         (".exo", GridFormat::Exodus),
+        (".exoii", GridFormat::Exodus),
         (".e", GridFormat::Exodus),
+        (".g", GridFormat::Exodus),
+        (".gen", GridFormat::Exodus),
     ];
-    endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, format)| format)
+    let by_ending = endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, format)| format);
+    // What follows numbers restarts and parts of a run: `run.e-s002`, `run.e.4.0`.
+    let is_numbered = |(_, rest): (&str, &str)| {
+        let rest = rest.strip_prefix("-s").or_else(|| rest.strip_prefix('.'));
+        rest.is_some_and(|rest| {
+            !rest.is_empty() && rest.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.')
+        })
+    };
+    by_ending.or_else(|| name.rsplit_once(".e").is_some_and(is_numbered).then_some(GridFormat::Exodus))
+}
+
+/// The first bytes of a file; none if it cannot be read.
+fn head_of(path: &Path) -> Vec<u8> {
+    let mut head = Vec::new();
+    if let Ok((file, _)) = bytes::open(path) {
+        // What has come counts.
+        let _ = file.take(1024).read_to_end(&mut head);
+    }
+    head
+}
+
+/// Whether the first bytes are those of a legacy file of structured points.
+fn is_structured_points(head: &[u8]) -> bool {
+    let head = String::from_utf8_lossy(head).to_ascii_uppercase();
+    // The title on the second line may be anything.
+    let mut lines = head.lines().map(str::trim).filter(|line| !line.is_empty());
+    let is_legacy = lines.next().is_some_and(|line| line.starts_with("# VTK DATAFILE"));
+    is_legacy && lines.any(|line| line.starts_with("DATASET") && line.ends_with(legacy::POINTS_DATASET))
 }
 
 /// The format that the first bytes of a file prove.
-fn format_by_content(path: &Path) -> Option<GridFormat> {
-    let mut head = Vec::new();
-    bytes::open(path).ok()?.0.take(512).read_to_end(&mut head).ok()?;
-    let head = String::from_utf8_lossy(&head);
-    let root = head.find("<VTKFile").map(|start| &head[start..]);
-    let root = root.map(|root| root.split('>').next().unwrap_or_default());
-    let is_type = |name: &str| root.is_some_and(|root| root.contains(&format!("\"{name}\"")));
-    if is_type("UnstructuredGrid") {
+fn format_by_content(head: &[u8]) -> Option<GridFormat> {
+    if is_vtk_xml(head, "UnstructuredGrid") {
         Some(GridFormat::Vtu)
-    } else if is_type("PUnstructuredGrid") {
+    } else if is_vtk_xml(head, "PUnstructuredGrid") {
         Some(GridFormat::Pvtu)
-    } else if is_type("Collection") {
+    } else if is_vtk_xml(head, "Collection") {
         Some(GridFormat::Pvd)
-    } else if head.starts_with("# vtk DataFile") {
+    } else if head.starts_with(b"# vtk DataFile") {
         Some(GridFormat::LegacyVtk)
+    } else if head.starts_with(b"CDF") || head.starts_with(b"\x89HDF") && contains(head, b"num_nodes") {
+        Some(GridFormat::Exodus)
     } else {
         None
     }
+}
+
+fn contains(bytes: &[u8], part: &[u8]) -> bool {
+    bytes.windows(part.len()).any(|window| window == part)
 }

@@ -95,12 +95,12 @@ impl FromStr for Element {
         let sample = match bare {
             "uint8" | "u1" | "uchar" => SampleType::U8,
             "int8" | "i1" => SampleType::I8,
-            "uint16" | "u2" => SampleType::U16,
-            "int16" | "i2" => SampleType::I16,
-            "uint32" | "u4" => SampleType::U32,
-            "int32" | "i4" => SampleType::I32,
-            "float32" | "f4" => SampleType::F32,
-            "float64" | "f8" => SampleType::F64,
+            "uint16" | "u16" | "u2" | "ushort" => SampleType::U16,
+            "int16" | "i16" | "i2" | "short" => SampleType::I16,
+            "uint32" | "u32" | "u4" => SampleType::U32,
+            "int32" | "i32" | "i4" => SampleType::I32,
+            "float32" | "f32" | "f4" | "float" => SampleType::F32,
+            "float64" | "f64" | "f8" | "double" => SampleType::F64,
             _ => return Err(ParseElementError { found: quoted(name) }),
         };
         Ok(Self { sample, order })
@@ -159,19 +159,6 @@ impl Layout {
     pub(crate) fn num_bytes(&self) -> u64 {
         (self.num_samples() * self.sample.bytes()) as u64
     }
-}
-
-/// The first three axes of any number of them: fewer are filled up with 1, of more the first volume is
-/// taken, with a note.
-pub(crate) fn first_volume(field: &str, dims: &[u64], notes: &mut Vec<String>) -> Result<[u64; 3], Problem> {
-    if dims.contains(&0) {
-        return Err(Problem::field(field, format!("{dims:?}"), "at least 1 along each axis"));
-    }
-    let volumes = dims.iter().skip(3).fold(1u64, |volumes, &n| volumes.saturating_mul(n));
-    if volumes > 1 {
-        notes.push(format!("the file holds {volumes} volumes; the first is used"));
-    }
-    Ok(std::array::from_fn(|axis| dims.get(axis).copied().unwrap_or(1)))
 }
 
 /// The spacing to use: the caller's, else the file's if it is usable. A negative one loses its sign, with

@@ -1,6 +1,6 @@
 //! Files in, files out: volumes, unstructured grids, opaque meshes, images, scene files, transfer functions.
 //!
-//! [`read_volume`] reads raw, NIfTI-1, NRRD, MetaImage, VTK image data, TIFF, PNG, JPEG and folders of
+//! [`read_volume`] reads raw, NIfTI, NRRD, MetaImage, VTK image data, TIFF, PNG, JPEG and folders of
 //! slices into a [`VoxelGrid`](volery_scene::VoxelGrid); [`read_grid`] reads VTK's XML and legacy unstructured
 //! grids, also in parallel pieces and time steps, and Exodus II in netCDF-3 into an
 //! [`UnstructuredGrid`](volery_scene::UnstructuredGrid); [`read_mesh`] reads opaque surfaces; [`SceneFile`] and [`ColorMap`] read what to draw;
@@ -19,11 +19,13 @@
 //!   be changed while the volume lives, as with every memory map.
 //!
 //! # Conventions
-//! Positions are index times spacing: origins, affines and orientations in files are not used. Pictures
-//! hold linear values without gamma, row 0 at the top.
+//! A sample is drawn at its index times the spacing. Where the file says that it lies is carried beside that, as
+//! [`world_from_index`](volery_scene::VoxelGrid::world_from_index): in right, anterior, superior for anatomical
+//! files, in the file's own axes for others ([`World`]); where the two differ by more than place and size, a note says
+//! so. Pictures hold linear values without gamma, row 0 at the top.
 //!
 //! # Non-goals
-//! Materials of meshes; polyhedra and cells without volume; netCDF-4; DICOM; colour maps by index.
+//! Materials of meshes; polyhedra and cells without volume; netCDF-4; DICOM; colours of palettes.
 
 mod bytes;
 mod error;
@@ -31,7 +33,9 @@ pub mod grid;
 mod layout;
 pub mod mesh;
 mod numbers;
+mod orientation;
 mod out;
+mod raster;
 pub mod scene_file;
 pub mod stack;
 pub mod transfer;
@@ -42,6 +46,7 @@ pub use error::{Problem, ReadError};
 pub use grid::{GridFile, GridOptions, is_grid, read_grid};
 pub use layout::{ByteOrder, Element, ParseElementError};
 pub use mesh::{MeshFile, read_mesh};
+pub use orientation::{Orientation, World};
 pub use out::{Picture, WriteError, read_png_rgb, write_atomically, write_exr, write_nrrd, write_png};
 pub use scene_file::SceneFile;
 pub use stack::{GlbOptions, read_stack, write_glb, write_vsl};

@@ -6,11 +6,11 @@ use std::io::Read;
 use std::str::FromStr;
 
 use bytemuck::Pod;
-use volery_scene::{SampleType, Samples};
+use volery_scene::SampleType;
 
-use crate::bytes::{read_full, read_samples, reserve};
+use crate::bytes::{read_full, reserve};
 use crate::error::{Problem, quoted};
-use crate::layout::{ByteOrder, Layout};
+use crate::layout::ByteOrder;
 
 /// Bytes that are decoded at once.
 const PIECE_BYTES: usize = 1 << 16;
@@ -51,6 +51,20 @@ impl Scalar {
         }
     }
 
+    /// The type of a sample that holds such a number, whole ones of 64 bits up to 2^53 exactly.
+    pub(crate) fn sample_type(self) -> SampleType {
+        match self {
+            Self::U8 => SampleType::U8,
+            Self::I8 => SampleType::I8,
+            Self::U16 => SampleType::U16,
+            Self::I16 => SampleType::I16,
+            Self::U32 => SampleType::U32,
+            Self::I32 => SampleType::I32,
+            Self::F32 => SampleType::F32,
+            Self::F64 | Self::U64 | Self::I64 => SampleType::F64,
+        }
+    }
+
     pub(crate) fn is_real(self) -> bool {
         matches!(self, Self::F32 | Self::F64)
     }
@@ -64,20 +78,26 @@ macro_rules! for_scalar {
     };
     (@ $scalar:expr, $alias:ident => $body:expr; $($variant:ident $type:ident),*) => {
         match $scalar {
-            $(Scalar::$variant => {
+            $($crate::numbers::Scalar::$variant => {
                 type $alias = $type;
                 $body
             })*
         }
     };
 }
-use for_scalar;
+pub(crate) use for_scalar;
 
 /// A number of a file as the readers use it.
-trait Number: Pod + FromStr {
+pub(crate) trait Number: Pod + FromStr {
     fn real(self) -> f64;
     /// `None` where the number does not fit.
     fn whole(self) -> Option<i64>;
+    /// What a word stands for by which some programs write what is no number: `-nan(ind)`, `1.#QNAN`, `1.#INF`.
+    fn blank(_word: &str) -> Option<Self> {
+        None
+    }
+    /// The lowest byte of a whole number after a shift; 0 of a real one.
+    fn byte(self, shift: u32) -> u8;
 }
 
 macro_rules! whole_numbers {
@@ -88,6 +108,9 @@ macro_rules! whole_numbers {
             }
             fn whole(self) -> Option<i64> {
                 i64::try_from(self).ok()
+            }
+            fn byte(self, shift: u32) -> u8 {
+                (self as u64 >> shift) as u8
             }
         }
     )*};
@@ -102,6 +125,13 @@ macro_rules! real_numbers {
             }
             fn whole(self) -> Option<i64> {
                 None
+            }
+            fn blank(word: &str) -> Option<Self> {
+                let word = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
+                (word.starts_with("nan") || word.starts_with("1.#")).then_some(<$type>::NAN)
+            }
+            fn byte(self, _shift: u32) -> u8 {
+                0
             }
         }
     )*};
@@ -120,26 +150,6 @@ pub(crate) enum Numbers<'a> {
 pub(crate) const DATA: &str = "the data of the array";
 
 impl Numbers<'_> {
-    /// Exactly the samples of a layout.
-    pub(crate) fn samples(self, layout: &Layout) -> Result<Samples, Problem> {
-        let count = layout.num_samples();
-        if let Self::Bytes(mut source, _) = self {
-            return read_samples(&mut *source, DATA, layout);
-        }
-        Ok(match layout.sample {
-            SampleType::U8 => self.each::<u8, u8>(count, Ok)?.into(),
-            SampleType::I8 => self.each::<i8, i8>(count, Ok)?.into(),
-            SampleType::U16 => self.each::<u16, u16>(count, Ok)?.into(),
-            SampleType::I16 => self.each::<i16, i16>(count, Ok)?.into(),
-            SampleType::U32 => self.each::<u32, u32>(count, Ok)?.into(),
-            SampleType::I32 => self.each::<i32, i32>(count, Ok)?.into(),
-            SampleType::F32 => self.each::<f32, f32>(count, Ok)?.into(),
-            SampleType::F64 => self.each::<f64, f64>(count, Ok)?.into(),
-            SampleType::Rgb8 => self.each::<u8, u8>(3 * count, Ok)?.as_chunks::<3>().0.to_vec().into(),
-            SampleType::Rgba8 => self.each::<u8, u8>(4 * count, Ok)?.as_chunks::<4>().0.to_vec().into(),
-        })
-    }
-
     /// Exactly `count` numbers of any type.
     pub(crate) fn reals(self, scalar: Scalar, count: usize) -> Result<Vec<f64>, Problem> {
         for_scalar!(scalar, T => self.each(count, |value: T| Ok(value.real())))
@@ -179,6 +189,35 @@ impl Numbers<'_> {
         })
     }
 
+    /// Whether tuples of so many numbers differ from the first of them, which `seen` keeps from list to list; reads
+    /// no further than it must.
+    pub(crate) fn vary(
+        self,
+        scalar: Scalar,
+        count: usize,
+        components: usize,
+        seen: &mut Vec<f64>,
+    ) -> Result<bool, Problem> {
+        // Text says only at its end how many numbers it holds; of bytes that is known.
+        let is_text = matches!(self, Self::Text(_));
+        let (mut differs, mut component) = (false, 0);
+        let mut look = |value: f64| {
+            if seen.len() == component {
+                seen.push(value);
+            }
+            // A value that is blank differs from none.
+            differs |= value.is_finite() && seen[component].is_finite() && value != seen[component];
+            if value.is_finite() && !seen[component].is_finite() {
+                seen[component] = value;
+            }
+            component = (component + 1) % components.max(1);
+            // Ends the walk.
+            if differs && !is_text { Err(Problem::missing("reason to read on", "none")) } else { Ok(()) }
+        };
+        let walked = for_scalar!(scalar, T => self.visit(count, |value: T| look(value.real())));
+        if differs && !is_text { Ok(true) } else { walked.map(|()| differs) }
+    }
+
     fn each<T: Number, U>(
         self,
         count: usize,
@@ -195,7 +234,8 @@ impl Numbers<'_> {
         Ok(values)
     }
 
-    fn visit<T: Number>(
+    /// Exactly `count` numbers of one type, one after the other.
+    pub(crate) fn visit<T: Number>(
         self,
         count: usize,
         visit: impl FnMut(T) -> Result<(), Problem>,
@@ -247,7 +287,8 @@ fn parse_each<T: Number>(
         if done == count {
             return Err(Problem::field("count of numbers in the array", "more", count));
         }
-        visit(word.parse().map_err(|_| Problem::field(DATA, quoted(word), "a number of its type"))?)?;
+        let number = word.parse().ok().or_else(|| T::blank(word));
+        visit(number.ok_or_else(|| Problem::field(DATA, quoted(word), "a number of its type"))?)?;
         done += 1;
     }
     if done < count {

@@ -10,8 +10,12 @@ use volery_scene::{Samples, VoxelGrid};
 use crate::bytes::{self, Compression};
 use crate::error::{Problem, ReadError, quoted};
 use crate::layout::Element;
+use crate::orientation::{Orientation, Placement, World};
 
+mod foreign;
 mod image;
+mod image_data;
+mod legacy;
 mod metaimage;
 mod nifti;
 mod nrrd;
@@ -23,6 +27,9 @@ mod tiff;
 mod vti;
 
 pub(crate) use png::read_png;
+
+/// What is looked at to tell the format of a file.
+const HEAD_BYTES: u64 = 1024;
 
 /// What the caller knows or wants beside the file.
 #[derive(Clone, Debug)]
@@ -37,6 +44,11 @@ pub struct ReadOptions {
     pub spacing: Option<DVec3>,
     /// The array to read where a file has several.
     pub array: Option<String>,
+    /// The channel or component to read, from 0, where samples have several; else colours as colours, vectors by
+    /// their magnitude, and of other channels the first.
+    pub channel: Option<usize>,
+    /// Which of several volumes to read, from 0; else the first.
+    pub time_step: Option<usize>,
     /// Limit of the decoded samples in bytes.
     pub max_bytes: u64,
 }
@@ -44,7 +56,15 @@ pub struct ReadOptions {
 impl Default for ReadOptions {
     /// Everything from the file, at most 64 GiB.
     fn default() -> Self {
-        Self { dims: None, element: None, spacing: None, array: None, max_bytes: 64 << 30 }
+        Self {
+            dims: None,
+            element: None,
+            spacing: None,
+            array: None,
+            channel: None,
+            time_step: None,
+            max_bytes: 64 << 30,
+        }
     }
 }
 
@@ -54,7 +74,7 @@ impl Default for ReadOptions {
 pub enum Format {
     /// Samples and nothing else, plain, gzip or Zstandard.
     Raw,
-    /// NIfTI-1, `.nii` and `.nii.gz`.
+    /// NIfTI-1 or NIfTI-2, `.nii` and `.nii.gz`.
     Nifti,
     /// NRRD, attached or with a detached header.
     Nrrd,
@@ -62,6 +82,10 @@ pub enum Format {
     MetaImage,
     /// VTK's XML image data, `.vti`.
     Vti,
+    /// The same in pieces, each a file of its own, `.pvti`.
+    Pvti,
+    /// VTK's legacy format with structured points, `.vtk`.
+    LegacyVtk,
     /// One TIFF of one or more pages.
     Tiff,
     /// One PNG image.
@@ -76,10 +100,12 @@ impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Raw => "raw",
-            Self::Nifti => "NIfTI-1",
+            Self::Nifti => "NIfTI",
             Self::Nrrd => "NRRD",
             Self::MetaImage => "MetaImage",
             Self::Vti => "VTK image data",
+            Self::Pvti => "VTK parallel image data",
+            Self::LegacyVtk => "legacy VTK structured points",
             Self::Tiff => "TIFF",
             Self::Png => "PNG",
             Self::Jpeg => "JPEG",
@@ -97,9 +123,20 @@ pub struct Volume {
     pub format: Format,
     /// The name of the array, where the format names arrays.
     pub array: Option<String>,
+    /// What the world of the file is, which [`VoxelGrid::world_from_index`] leads to.
+    pub world: World,
+    /// The smallest and largest value that the file asks to show.
+    pub display_range: Option<[f64; 2]>,
     /// What the reader decided for the user, a sentence each: volumes left out, cell data taken as
     /// samples, and the like.
     pub notes: Vec<String>,
+}
+
+impl Volume {
+    /// How the axes of the samples lie in the world of the file.
+    pub fn orientation(&self) -> Orientation {
+        Orientation::of(&self.grid.world_from_index(), self.world)
+    }
 }
 
 /// What one reader gets out of a file.
@@ -108,7 +145,40 @@ pub(crate) struct Decoded {
     pub(crate) spacing: DVec3,
     pub(crate) samples: Samples,
     pub(crate) array: Option<String>,
+    /// Where the file says that the samples lie; `None` where it says nothing.
+    pub(crate) placement: Option<Placement>,
+    pub(crate) display_range: Option<[f64; 2]>,
     pub(crate) notes: Vec<String>,
+}
+
+impl Decoded {
+    /// Samples of a file that says no more.
+    pub(crate) fn new(dims: [usize; 3], spacing: DVec3, samples: Samples, notes: Vec<String>) -> Self {
+        Self { dims, spacing, samples, array: None, placement: None, display_range: None, notes }
+    }
+
+    /// The volume, in the place that its file gives it unless the caller's spacing is another.
+    fn volume(self, format: Format, options: &ReadOptions) -> Result<Volume, Problem> {
+        let Self { dims, spacing, samples, array, placement, display_range, mut notes } = self;
+        let mut grid = VoxelGrid::new(dims, spacing, samples).map_err(Problem::Grid)?;
+        let placement = match options.spacing {
+            Some(spacing) => placement.map(|placement| placement.with_spacing(spacing)),
+            None => placement,
+        };
+        let mut world = World::Plain;
+        if let Some(Placement { world_from_index, world: of_file }) = placement {
+            match grid.clone().with_world_from_index(world_from_index) {
+                Ok(placed) => {
+                    notes.extend(Orientation::of(&world_from_index, of_file).note());
+                    (grid, world) = (placed, of_file);
+                }
+                Err(_) => {
+                    notes.push("the axes of the file span no space; its orientation is not used".to_owned())
+                }
+            }
+        }
+        Ok(Volume { grid, format, array, world, display_range, notes })
+    }
 }
 
 /// Reads a volume from a file, or from a folder of slices.
@@ -131,12 +201,12 @@ pub fn read_volume(path: &Path, options: &ReadOptions) -> Result<Volume, ReadErr
             Format::Nrrd => nrrd::read(path, options),
             Format::MetaImage => metaimage::read(path, options),
             Format::Vti => vti::read(path, options),
+            Format::Pvti => vti::read_parallel(path, options),
+            Format::LegacyVtk => legacy::read(path, options),
             Format::Tiff | Format::Png | Format::Jpeg => stack::read_file(path, format, options),
             Format::Folder => stack::read_folder(path, options),
         }?;
-        let Decoded { dims, spacing, samples, array, notes } = decoded;
-        let grid = VoxelGrid::new(dims, spacing, samples).map_err(Problem::Grid)?;
-        Ok(Volume { grid, format, array, notes })
+        decoded.volume(format, options)
     };
     read().map_err(|problem| ReadError { path: path.to_owned(), problem })
 }
@@ -153,15 +223,15 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<Format, Problem> {
     if ends(&[".nii.gz"]) {
         return Ok(Format::Nifti);
     }
-    let (file, _) = bytes::open(path)?;
-    let mut head = Vec::new();
-    file.take(352).read_to_end(&mut head).map_err(Problem::Io)?;
+    let head = head_of(path)?;
     let by_name = || {
-        let endings: [(&[&str], Format); 7] = [
+        let endings: [(&[&str], Format); 9] = [
             (&[".nii"], Format::Nifti),
             (&[".nrrd", ".nhdr"], Format::Nrrd),
             (&[".mha", ".mhd"], Format::MetaImage),
             (&[".vti"], Format::Vti),
+            (&[".pvti"], Format::Pvti),
+            (&[".vtk"], Format::LegacyVtk),
             (&[".tif", ".tiff"], Format::Tiff),
             (&[".png"], Format::Png),
             (&[".jpg", ".jpeg"], Format::Jpeg),
@@ -174,11 +244,25 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<Format, Problem> {
     if options.dims.is_some() && options.element.is_some() {
         return Ok(Format::Raw);
     }
-    Err(Problem::field(
-        "file name",
-        quoted(&name),
-        "one that ends in .raw, .nii, .nrrd, .nhdr, .mha, .mhd, .vti, .tif, .png or .jpg, or dims and dtype",
-    ))
+    if let Some((format, way)) = foreign::format_of(&name, &head) {
+        return Err(Problem::field("format", format, way));
+    }
+    Err(Problem::field("file name", quoted(&name), foreign::ENDINGS))
+}
+
+/// The first bytes of a file, unpacked if they are gzip.
+fn head_of(path: &Path) -> Result<Vec<u8>, Problem> {
+    let mut head = Vec::new();
+    bytes::open(path)?.0.take(HEAD_BYTES).read_to_end(&mut head).map_err(Problem::Io)?;
+    if head.starts_with(&[0x1f, 0x8b]) {
+        let mut unpacked = Vec::new();
+        // What does not unpack says nothing.
+        let stream = bytes::open_stream(path, Compression::Gzip)?;
+        if stream.take(HEAD_BYTES).read_to_end(&mut unpacked).is_ok() {
+            return Ok(unpacked);
+        }
+    }
+    Ok(head)
 }
 
 /// The format that the first bytes of a file prove.
@@ -192,11 +276,26 @@ fn magic_format(head: &[u8]) -> Option<Format> {
         Some(Format::Jpeg)
     } else if [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].into_iter().any(|magic| starts(magic)) {
         Some(Format::Tiff)
-    } else if head.get(344..348).is_some_and(|magic| magic == b"n+1\0") {
+    } else if nifti::is_nifti(head) {
         Some(Format::Nifti)
+    } else if starts(b"# vtk DataFile") {
+        Some(Format::LegacyVtk)
+    } else if is_vtk_xml(head, "ImageData") {
+        Some(Format::Vti)
+    } else if is_vtk_xml(head, "PImageData") {
+        Some(Format::Pvti)
     } else {
         None
     }
+}
+
+/// Whether the first bytes of a file are VTK's XML of a type.
+pub(crate) fn is_vtk_xml(head: &[u8], name: &str) -> bool {
+    let head = String::from_utf8_lossy(head);
+    let root = head.split_once("<VTKFile").map(|(_, root)| root.split('>').next().unwrap_or_default());
+    root.is_some_and(|root| {
+        ['"', '\''].into_iter().any(|quote| root.contains(&format!("{quote}{name}{quote}")))
+    })
 }
 
 /// The name of a file in lower case; bytes that are not UTF-8 become replacement characters.

@@ -9,6 +9,7 @@ use quick_xml::XmlVersion;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
+use crate::bytes::{FileBytes, reserve};
 use crate::error::{Problem, quoted};
 use crate::layout::ByteOrder;
 use crate::numbers::{Numbers, Scalar};
@@ -37,9 +38,49 @@ pub(crate) struct Element<'a> {
     depth: usize,
     /// Index of the first element after it and all in it.
     end: usize,
-    /// The last text directly in it that is not blank.
-    text: &'a str,
+    /// The text directly in it, which comments and other elements may interrupt.
+    text: Cow<'a, str>,
 }
+
+/// The bytes of a file whose text is UTF-8, as it is or made so: VTK takes the bytes of Latin-1, too.
+pub(crate) enum XmlBytes {
+    Same(FileBytes),
+    Made(Vec<u8>),
+}
+
+impl XmlBytes {
+    /// Looks at the text before appended data.
+    pub(crate) fn new(file: FileBytes) -> Result<Self, Problem> {
+        let appended = file.windows(APPENDED.len()).position(|window| window == APPENDED);
+        let (text, rest) = file.split_at(appended.unwrap_or(file.len()));
+        if std::str::from_utf8(text).is_ok() {
+            return Ok(Self::Same(file));
+        }
+        let more = text.iter().filter(|byte| !byte.is_ascii()).count();
+        let mut made = Vec::new();
+        reserve(&mut made, file.len() + more)?;
+        for &byte in text {
+            // Latin-1 is the first 256 code points.
+            made.extend_from_slice(char::from(byte).encode_utf8(&mut [0; 4]).as_bytes());
+        }
+        made.extend_from_slice(rest);
+        Ok(Self::Made(made))
+    }
+}
+
+impl std::ops::Deref for XmlBytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Same(file) => file,
+            Self::Made(bytes) => bytes,
+        }
+    }
+}
+
+/// Where text ends.
+const APPENDED: &[u8] = b"<AppendedData";
 
 impl<'a> Document<'a> {
     /// Parses a file whose `type` must be `expected_type`.
@@ -71,7 +112,7 @@ impl<'a> Document<'a> {
                     if let (Cow::Borrowed(text), Some(&index)) = (text.into_inner(), open.last())
                         && !text.trim_ascii().is_empty()
                     {
-                        document.elements[index].text = text.trim_ascii();
+                        document.elements[index].add_text(text.trim_ascii());
                     }
                 }
                 Event::Eof if open.is_empty() => break,
@@ -86,7 +127,7 @@ impl<'a> Document<'a> {
 
     fn add(&mut self, start: BytesStart<'a>, depth: usize, expected_type: &str) -> Result<(), Problem> {
         let index = self.elements.len();
-        let element = Element { start, index, depth, end: index + 1, text: "" };
+        let element = Element { start, index, depth, end: index + 1, text: Cow::Borrowed("") };
         if self.elements.is_empty() {
             self.form = file_form(&element, expected_type)?;
         }
@@ -124,10 +165,16 @@ impl<'a> Document<'a> {
     }
 
     /// The numbers of a `DataArray`, which take `expected_bytes` in binary form.
-    pub(crate) fn numbers(&self, array: &Element<'a>, expected_bytes: u64) -> Result<Numbers<'a>, Problem> {
-        let binary = |encoding, bytes| Payload::Binary { encoding, bytes, form: self.form };
-        let payload = match array.attribute("format")?.as_deref() {
-            None | Some("ascii") => Payload::Ascii(array.text),
+    pub(crate) fn numbers<'n>(
+        &self,
+        array: &'n Element<'a>,
+        expected_bytes: u64,
+    ) -> Result<Numbers<'n>, Problem> {
+        let binary = |encoding, bytes: &'n [u8]| Payload::Binary { encoding, bytes, form: self.form };
+        let format = array.attribute("format")?;
+        // VTK looks at no case.
+        let payload = match format.as_deref().map(str::to_ascii_lowercase).as_deref() {
+            None | Some("ascii") => Payload::Ascii(&array.text),
             Some("binary") => binary(Encoding::Base64, array.text.as_bytes()),
             Some("appended") => {
                 let appended = self.appended.as_ref();
@@ -139,7 +186,10 @@ impl<'a> Document<'a> {
                 let expected = "a place inside the appended data";
                 binary(*encoding, data.ok_or_else(|| Problem::field("offset", offset, expected))?)
             }
-            found => return Err(Problem::field("format", shown(found), "ascii, binary or appended")),
+            _ => {
+                let expected = "ascii, binary or appended";
+                return Err(Problem::field("format", shown(format.as_deref()), expected));
+            }
         };
         payload.open(expected_bytes)
     }
@@ -178,6 +228,18 @@ fn file_form(root: &Element, expected_type: &str) -> Result<BinaryForm, Problem>
     Ok(BinaryForm { order, header_bytes, compressor })
 }
 
+impl<'a> Element<'a> {
+    fn add_text(&mut self, text: &'a str) {
+        if self.text.is_empty() {
+            self.text = Cow::Borrowed(text);
+        } else {
+            let whole = self.text.to_mut();
+            whole.push(' ');
+            whole.push_str(text);
+        }
+    }
+}
+
 impl Element<'_> {
     fn is(&self, name: &str) -> bool {
         self.start.local_name().as_ref() == name
@@ -192,6 +254,16 @@ impl Element<'_> {
         let Some(text) = self.attribute(name)? else { return Ok(None) };
         let number = text.trim().parse();
         number.map(Some).map_err(|_| Problem::field(name, quoted(text), "a whole number"))
+    }
+
+    /// Numbers of each value of a `DataArray`; an empty attribute counts as none.
+    pub(crate) fn components(&self) -> Result<u64, Problem> {
+        match self.attribute("NumberOfComponents")?.as_deref().map(str::trim) {
+            None | Some("") => Ok(1),
+            Some(text) => {
+                text.parse().map_err(|_| Problem::field("NumberOfComponents", quoted(text), "a whole number"))
+            }
+        }
     }
 
     /// An attribute of exactly `N` numbers.

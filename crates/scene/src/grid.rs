@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use crate::samples::{SampleType, Samples};
 
@@ -11,8 +11,12 @@ use crate::samples::{SampleType, Samples};
 pub struct VoxelGrid {
     dims: [usize; 3],
     spacing: DVec3,
+    world_from_index: DAffine3,
     samples: Samples,
 }
+
+/// Axes of length 1 that span less are taken to lie in a plane.
+const MIN_ORIENTATION_VOLUME: f64 = 1e-9;
 
 /// One thing that is wrong with a grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +45,8 @@ pub enum Defect {
         /// The spacing as given.
         found: f64,
     },
+    /// An orientation that is not finite, or that maps space to a plane, a line or a point.
+    Orientation,
 }
 
 impl fmt::Display for Defect {
@@ -53,6 +59,9 @@ impl fmt::Display for Defect {
             Self::SampleCount { found, expected } => write!(f, "{found} samples, expected {expected}"),
             Self::Spacing { axis, found } => {
                 write!(f, "spacing {found} along axis {axis}, expected a positive finite number")
+            }
+            Self::Orientation => {
+                write!(f, "an orientation that cannot be turned back, expected three finite independent axes")
             }
         }
     }
@@ -94,7 +103,25 @@ impl VoxelGrid {
     pub fn new(dims: [usize; 3], spacing: DVec3, samples: impl Into<Samples>) -> Result<Self, Error> {
         let samples = samples.into();
         let defects = defects(dims, spacing, samples.len());
-        if defects.is_empty() { Ok(Self { dims, spacing, samples }) } else { Err(Error { defects }) }
+        if !defects.is_empty() {
+            return Err(Error { defects });
+        }
+        Ok(Self { dims, spacing, world_from_index: DAffine3::from_scale(spacing), samples })
+    }
+
+    /// The same samples, with the place and orientation that their file gives them. What is drawn does not
+    /// change: pictures show a sample at its index times the spacing.
+    ///
+    /// # Errors
+    /// When the map is not finite or cannot be turned back.
+    pub fn with_world_from_index(self, world_from_index: DAffine3) -> Result<Self, Error> {
+        let [x, y, z] = world_from_index.matrix3.to_cols_array_2d().map(DVec3::from_array);
+        // Against the lengths, so that small voxels are as good as large ones.
+        let volume = x.normalize_or_zero().cross(y.normalize_or_zero()).dot(z.normalize_or_zero());
+        if !world_from_index.is_finite() || volume.abs() < MIN_ORIENTATION_VOLUME {
+            return Err(Error { defects: vec![Defect::Orientation] });
+        }
+        Ok(Self { world_from_index, ..self })
     }
 
     /// Samples along x, y, z; each at least 1.
@@ -105,6 +132,12 @@ impl VoxelGrid {
     /// World distance of neighbouring samples along x, y, z.
     pub fn spacing(&self) -> DVec3 {
         self.spacing
+    }
+
+    /// From the index of a sample to its place in the world of its file; index times spacing where the file
+    /// says nothing. The lengths of its axes are those of the file, which the spacing may differ from.
+    pub fn world_from_index(&self) -> DAffine3 {
+        self.world_from_index
     }
 
     /// The samples, x fastest.
@@ -162,6 +195,19 @@ mod tests {
         let huge = usize::MAX / 2;
         let error = VoxelGrid::new([huge, 3, 1], DVec3::ONE, Vec::<f32>::new()).unwrap_err();
         assert_eq!(error.defects, [Defect::TooManySamples { dims: [huge, 3, 1] }]);
+    }
+
+    #[test]
+    fn orientation_is_carried_and_must_be_invertible() {
+        let grid = VoxelGrid::new([2, 1, 1], DVec3::new(2.0, 3.0, 4.0), vec![1u8, 2]).unwrap();
+        assert_eq!(grid.world_from_index().transform_point3(DVec3::ONE), DVec3::new(2.0, 3.0, 4.0));
+        let mirror = DAffine3::from_translation(DVec3::X) * DAffine3::from_scale(DVec3::new(-1e-9, 3.0, 4.0));
+        let grid = grid.with_world_from_index(mirror).unwrap();
+        assert_eq!((grid.world_from_index(), grid.spacing().x), (mirror, 2.0));
+        for bad in [DVec3::new(1.0, 0.0, 1.0), DVec3::new(1.0, f64::NAN, 1.0)] {
+            let error = grid.clone().with_world_from_index(DAffine3::from_scale(bad)).unwrap_err();
+            assert_eq!(error.defects, [Defect::Orientation]);
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
-use volery_io::Volume;
+use volery_io::{Volume, World};
 
 use crate::histogram::Histogram;
 
@@ -31,6 +31,16 @@ pub struct Info {
     pub spacing: [f64; 3],
     /// World position of the last sample; the first is at the origin.
     pub extent: [f64; 3],
+    /// Which way the axes of the samples run in the world of the file, as `LPS` or `+x -y +z`; missing if the file
+    /// says nothing of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<String>,
+    /// Where the first sample lies in the world of the file; missing if that is its origin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<[f64; 3]>,
+    /// The smallest and largest value that the file asks to show.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub display_range: Option<[f64; 2]>,
     /// Name of the array that was read, where the format names arrays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub array: Option<String>,
@@ -71,6 +81,9 @@ impl Info {
             };
             Channel { range, blank, histogram: histogram.map(|histogram| histogram.coarse_counts(NUM_BINS)) }
         });
+        let orientation = volume.orientation();
+        let is_oriented = volume.world == World::Anatomical || !orientation.is_identity();
+        let origin = grid.world_from_index().translation.to_array();
         Self {
             kind: if grid.dims()[2] == 1 { "image" } else { "volume" },
             format: volume.format.to_string(),
@@ -78,6 +91,9 @@ impl Info {
             scalar: grid.sample_type().name(),
             spacing: grid.spacing().to_array(),
             extent: grid.extent().to_array(),
+            orientation: is_oriented.then(|| orientation.to_string()),
+            origin: (origin != [0.0; 3]).then_some(origin),
+            display_range: volume.display_range,
             array: volume.array.clone(),
             channels: channels.collect(),
             notes: volume.notes.clone(),
@@ -94,6 +110,15 @@ impl fmt::Display for Info {
         writeln!(f, "type      {}", self.scalar)?;
         writeln!(f, "spacing   {}", times(&self.spacing))?;
         writeln!(f, "extent    {}", times(&self.extent))?;
+        if let Some(orientation) = &self.orientation {
+            writeln!(f, "axes      {orientation}")?;
+        }
+        if let Some(origin) = self.origin {
+            writeln!(f, "origin    {}", origin.map(number).join(", "))?;
+        }
+        if let Some([low, high]) = self.display_range {
+            writeln!(f, "window    {} to {}", number(low), number(high))?;
+        }
         if let Some(array) = &self.array {
             writeln!(f, "array     {}", array.escape_debug())?;
         }

@@ -1,6 +1,6 @@
 //! Exodus II in netCDF-3: nodes, blocks of elements of one type, values at nodes and on elements at time steps.
 //!
-//! The first time step is read. Side sets and node sets are not used. Files in netCDF-4, which is HDF5, are
+//! One time step is read, the first unless another one is asked for. Side sets and node sets are not used. Files in netCDF-4, which is HDF5, are
 //! refused. Each list is checked against the size of the file before it is read.
 
 use glam::DVec3;
@@ -23,6 +23,9 @@ struct Exodus {
     /// For each array its number among those of its place, from 0.
     numbers: Vec<u64>,
     num_steps: u64,
+    /// The one that is read.
+    step: u64,
+    is_step_chosen: bool,
 }
 
 /// Elements of one type.
@@ -37,14 +40,24 @@ struct Block {
 /// Opens the content of a file and runs something on it.
 pub(super) fn with_parts<R>(
     bytes: &[u8],
+    step: Option<usize>,
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
     if bytes.starts_with(b"\x89HDF") {
-        return Err(Problem::field("format", "netCDF-4 (HDF5)", "Exodus II in netCDF-3 (classic)"));
+        let expected = "Exodus II in netCDF-3 (classic), as 'nccopy -k cdf5' makes it";
+        return Err(Problem::field("format", "netCDF-4 (HDF5)", expected));
     }
     let file = NcFile::from_bytes(bytes).map_err(|error| Problem::damaged("the netCDF header", error))?;
-    let exodus = Exodus::new(file, bytes.len() as u64)?;
-    run(&[Part { path: None, piece: Box::new(exodus) }])
+    let mut exodus = Exodus::new(file, bytes.len() as u64)?;
+    if let Some(step) = step {
+        exodus.step = step as u64;
+        exodus.is_step_chosen = true;
+        if exodus.step >= exodus.num_steps.max(1) {
+            let expected = format!("0 to {}", exodus.num_steps.max(1) - 1);
+            return Err(Problem::field("time step asked for", step, expected));
+        }
+    }
+    run(&[Part::new(None, exodus)])
 }
 
 impl Exodus {
@@ -58,6 +71,8 @@ impl Exodus {
             arrays: Vec::new(),
             numbers: Vec::new(),
             num_steps: 0,
+            step: 0,
+            is_step_chosen: false,
         };
         let expected = "the dimension of an Exodus II file";
         let needed = |name: &str| exodus.dimension(name)?.ok_or_else(|| Problem::missing(name, expected));
@@ -237,9 +252,15 @@ impl Piece for Exodus {
     }
 
     fn notes(&self) -> Vec<String> {
-        let several = self.num_steps > 1;
+        let several = self.num_steps > 1 && !self.is_step_chosen;
         several
-            .then(|| format!("the file has {} time steps; the first is used", self.num_steps))
+            .then(|| {
+                let last = self.num_steps - 1;
+                format!(
+                    "the file has {} time steps; the first is used (another, 0 to {last}, can be chosen)",
+                    self.num_steps
+                )
+            })
             .into_iter()
             .collect()
     }
@@ -281,21 +302,29 @@ impl Piece for Exodus {
         if self.arrays[array].array.place == Place::Points {
             let own = format!("vals_nod_var{}", number + 1);
             return if self.has(&own) {
-                self.read(&own, &[0], self.num_points)
+                self.read(&own, &[self.step], self.num_points)
             } else {
-                self.read("vals_nod_var", &[0, number], self.num_points)
+                self.read("vals_nod_var", &[self.step, number], self.num_points)
             };
         }
         let mut values = Vec::new();
         for block in &self.blocks {
             let own = format!("vals_elem_var{}eb{}", number + 1, block.number);
             if self.has(&own) {
-                values.extend(self.read(&own, &[0], block.elements)?);
+                values.extend(self.read(&own, &[self.step], block.elements)?);
             } else {
                 // The file says that this block has no such value.
                 values.resize(values.len() + block.elements, f64::NAN);
             }
         }
         Ok(values)
+    }
+
+    fn varies(&self, array: usize, seen: &mut Vec<f64>) -> Result<bool, Problem> {
+        let values = self.values(array)?;
+        let mut known = seen.first().copied().into_iter().chain(values).filter(|value| value.is_finite());
+        let Some(first) = known.next() else { return Ok(false) };
+        *seen = vec![first];
+        Ok(known.any(|value| value != first))
     }
 }

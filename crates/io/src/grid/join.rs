@@ -14,9 +14,11 @@ const POINT_BYTES: u128 = 32;
 const CELL_BYTES: u128 = 5;
 const NODE_BYTES: u64 = 4;
 
-/// Bits of `vtkGhostType` on cells: a copy of a cell in another piece, one that finer ones replace, hidden.
+/// Bits of `vtkGhostType` on cells: a copy of a cell in another piece, one that finer ones replace, hidden; and on
+/// points: hidden.
 const DUPLICATE_OR_REFINED: u8 = 1 | 8;
 const HIDDEN: u8 = 32;
+const HIDDEN_POINT: u8 = 2;
 
 /// Reads and joins the pieces; also says which array was read and what was decided.
 pub(super) fn join(
@@ -24,7 +26,8 @@ pub(super) fn join(
     options: &GridOptions,
 ) -> Result<(UnstructuredGrid, Option<GridArray>, Vec<String>), Problem> {
     let bytes_left = bytes_left(parts, options)?;
-    let array = choose(parts, options.array.as_deref())?;
+    let mut decided = Vec::new();
+    let array = choose(parts, options.array.as_deref(), &mut decided)?;
     let has_several = parts.iter().filter(|part| part.piece.num_cells() > 0).count() > 1;
     let places = has_several.then(HashMap::new);
     let mut joined = Joined { nodes_left: bytes_left / NODE_BYTES, places, ..Joined::default() };
@@ -32,7 +35,13 @@ pub(super) fn join(
         part.run(|piece| joined.add(piece, array.as_ref()))?;
     }
     let (grid, mut notes) = joined.finish(array.as_ref())?;
-    notes.extend(parts.iter().flat_map(|part| part.piece.notes()));
+    for note in parts.iter().flat_map(|part| [part.notes.clone(), part.piece.notes()].concat()) {
+        // Pieces of one grid often say the same.
+        if !decided.contains(&note) {
+            decided.push(note);
+        }
+    }
+    notes.append(&mut decided);
     Ok((grid, array, notes))
 }
 
@@ -41,20 +50,25 @@ pub(super) fn ranges(parts: &[Part], options: &GridOptions) -> Result<Vec<ArrayR
     bytes_left(parts, options)?;
     let range_of = |array: &PieceArray| {
         let array = array.array.clone();
-        let (mut range, mut blank) = ([f64::INFINITY, f64::NEG_INFINITY], 0);
+        let (mut range, mut blank, mut problem) = ([f64::INFINITY, f64::NEG_INFINITY], 0, None);
         for part in parts {
-            let values = part.run(|piece| magnitudes(piece, &array))?;
-            for value in values {
-                if value.is_finite() {
-                    range = [range[0].min(value), range[1].max(value)];
-                } else {
-                    blank += 1;
+            match part.run(|piece| magnitudes(piece, &array)) {
+                Ok(values) => {
+                    for value in values {
+                        if value.is_finite() {
+                            range = [range[0].min(value), range[1].max(value)];
+                        } else {
+                            blank += 1;
+                        }
+                    }
                 }
+                Err(found) => problem = Some(found.to_string()),
             }
         }
-        Ok(ArrayRange { array, range: (range[0] <= range[1]).then_some(range), blank })
+        let range = (range[0] <= range[1] && problem.is_none()).then_some(range);
+        ArrayRange { array, range, blank, problem }
     };
-    arrays(parts).iter().map(range_of).collect()
+    Ok(arrays(parts).iter().map(range_of).collect())
 }
 
 /// What the limit leaves for the nodes of cells, by the counts that the pieces state.
@@ -85,26 +99,67 @@ fn is_ghost(array: &GridArray) -> bool {
     matches!(array.name.as_str(), "vtkGhostType" | "vtkGhostLevels")
 }
 
-fn choose(parts: &[Part], wanted: Option<&str>) -> Result<Option<GridArray>, Problem> {
+/// The array that is asked for; else the active scalars, else the first: scalars before vectors, points before cells,
+/// and what is the same everywhere only where nothing else varies.
+fn choose(
+    parts: &[Part],
+    wanted: Option<&str>,
+    notes: &mut Vec<String>,
+) -> Result<Option<GridArray>, Problem> {
     let arrays = arrays(parts);
-    let find = |fits: &dyn Fn(&PieceArray) -> bool| {
-        let on = |place| arrays.iter().find(move |array| array.array.place == place && fits(array));
-        on(Place::Points).or_else(|| on(Place::Cells)).map(|found| found.array.clone())
-    };
     if let Some(name) = wanted {
-        let found = find(&|array| array.array.name == name);
-        return found.map(Some).ok_or_else(|| {
+        let on = |place| arrays.iter().find(move |a| a.array.place == place && a.array.name == name);
+        let found = on(Place::Points).or_else(|| on(Place::Cells));
+        if found.is_none() {
+            parts.iter().try_for_each(|part| part.run(|piece| piece.check_left_out(name)))?;
+        }
+        return found.map(|found| Some(found.array.clone())).ok_or_else(|| {
             let names: Vec<_> = arrays.iter().map(|array| array.array.name.as_str()).collect();
             Problem::field("array", quoted(name), format!("one of {}", quoted(names.join(", "))))
         });
     }
-    let scalar = |array: &PieceArray| array.array.components == 1 && !is_ghost(&array.array);
-    let on = |place| {
-        let here = move |array: &&PieceArray| array.array.place == place && scalar(array);
-        let active = arrays.iter().filter(here).find(|array| array.is_active);
-        active.or_else(|| arrays.iter().find(here)).map(|found| found.array.clone())
-    };
-    Ok(on(Place::Points).or_else(|| on(Place::Cells)).or_else(|| find(&|array| !is_ghost(&array.array))))
+    let mut candidates: Vec<_> = arrays.iter().filter(|array| !is_ghost(&array.array)).collect();
+    // Stable, so that the order of the file decides last.
+    candidates.sort_by_key(|PieceArray { array, is_active }| {
+        let is_vector = array.components > 1;
+        (is_vector, array.place == Place::Cells, !is_active)
+    });
+    let mut skipped = Vec::new();
+    for candidate in candidates.iter().filter(|_| candidates.len() > 1) {
+        let name = quoted(&candidate.array.name);
+        match varies(parts, &candidate.array) {
+            Ok(false) => skipped.push(format!("array {name} is the same everywhere")),
+            // What the file shows must be read, or its fault be said.
+            Err(problem) if !candidate.is_active => {
+                skipped.push(format!("array {name} cannot be read: {problem}"));
+            }
+            _ => {
+                notes.extend(skipped.iter().map(|why| format!("{why}; {name} is used")));
+                return Ok(Some(candidate.array.clone()));
+            }
+        }
+    }
+    Ok(candidates.first().map(|first| first.array.clone()))
+}
+
+/// Whether an array has two values that differ.
+fn varies(parts: &[Part], array: &GridArray) -> Result<bool, Problem> {
+    let mut seen = Vec::new();
+    for part in parts {
+        let differs = part.run(|piece| match piece_tuples(piece, array) {
+            0 => Ok(false),
+            _ => piece.varies(index_of(piece, array)?, &mut seen),
+        })?;
+        if differs {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// The values that a piece has of an array.
+fn piece_tuples(piece: &dyn Piece, array: &GridArray) -> u64 {
+    if array.place == Place::Points { piece.num_points() } else { piece.num_cells() }
 }
 
 /// The place of an array in a piece.
@@ -122,8 +177,7 @@ fn index_of(piece: &dyn Piece, array: &GridArray) -> Result<usize, Problem> {
 
 /// The values of an array, those of several components by their magnitude.
 fn magnitudes(piece: &dyn Piece, array: &GridArray) -> Result<Vec<f64>, Problem> {
-    let tuples = if array.place == Place::Points { piece.num_points() } else { piece.num_cells() };
-    if tuples == 0 {
+    if piece_tuples(piece, array) == 0 {
         return Ok(Vec::new());
     }
     let values = piece.values(index_of(piece, array)?)?;
@@ -135,14 +189,29 @@ fn magnitudes(piece: &dyn Piece, array: &GridArray) -> Result<Vec<f64>, Problem>
     })
 }
 
-/// For each cell the bits of `vtkGhostType`; empty if the piece says nothing.
-fn ghost_bits(piece: &dyn Piece) -> Result<Vec<u8>, Problem> {
-    let place = |array: &PieceArray| array.array.place == Place::Cells && is_ghost(&array.array);
-    let Some(index) = piece.arrays().iter().position(place) else { return Ok(Vec::new()) };
+/// For each cell or point the bits of `vtkGhostType`; empty if the piece says nothing.
+fn ghost_bits(piece: &dyn Piece, place: Place) -> Result<Vec<u8>, Problem> {
+    let is_there = |array: &PieceArray| array.array.place == place && is_ghost(&array.array);
+    let Some(index) = piece.arrays().iter().position(is_there) else { return Ok(Vec::new()) };
     let levels = piece.arrays()[index].array.name == "vtkGhostLevels";
     let bits = |value: f64| if levels { u8::from(value > 0.0) } else { value as u8 };
     let components = piece.arrays()[index].array.components;
     Ok(piece.values(index)?.into_iter().step_by(components).map(bits).collect())
+}
+
+/// Bits of `vtkGhostType`; a list is empty where the piece says nothing.
+struct Ghosts {
+    cells: Vec<u8>,
+    points: Vec<u8>,
+}
+
+impl Ghosts {
+    /// Those of a cell, which a hidden corner hides.
+    fn of(&self, cell: usize, corners: &[u32]) -> u8 {
+        let bits = |list: &[u8], index: usize| list.get(index).copied().unwrap_or(0);
+        let hides = |&node: &u32| bits(&self.points, node as usize) & HIDDEN_POINT != 0;
+        bits(&self.cells, cell) | if corners.iter().any(hides) { HIDDEN } else { 0 }
+    }
 }
 
 /// What has been read so far.
@@ -181,7 +250,8 @@ impl Joined {
     fn add(&mut self, piece: &dyn Piece, array: Option<&GridArray>) -> Result<(), Problem> {
         let cells = piece.cells(self.nodes_left)?;
         self.nodes_left -= (cells.nodes.len() as u64).min(self.nodes_left);
-        let ghosts = ghost_bits(piece)?;
+        let ghosts =
+            Ghosts { cells: ghost_bits(piece, Place::Cells)?, points: ghost_bits(piece, Place::Points)? };
         let (points, mut values) = (piece.points()?, None);
         if let Some(array) = array {
             values = Some(magnitudes(piece, array)?);
@@ -234,7 +304,7 @@ impl Joined {
         &mut self,
         cells: &PieceCells,
         places: &[u32],
-        ghosts: &[u8],
+        ghosts: &Ghosts,
         cell_values: Option<&[f64]>,
     ) -> Result<(), Problem> {
         let mut start = 0;
@@ -249,6 +319,7 @@ impl Joined {
                 let field = format!("number of nodes of cell {cell} ({})", kinds::name(vtk));
                 return Err(Problem::field(field, nodes.len(), cell_type.num_nodes()));
             };
+            let bits = ghosts.of(cell, corners);
             let corners = corners.iter().map(|&node| places[node as usize]);
             let mut blank = false;
             if let Some(&value) = cell_values.and_then(|values| values.get(cell)) {
@@ -259,7 +330,6 @@ impl Joined {
                     self.cells_around[node as usize] += 1;
                 }
             }
-            let bits = ghosts.get(cell).copied().unwrap_or(0);
             if bits & DUPLICATE_OR_REFINED != 0 {
                 self.counts.copies += 1;
                 continue;

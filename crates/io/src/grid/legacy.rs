@@ -1,4 +1,4 @@
-//! VTK's legacy format, `.vtk`: unstructured grids in text or in big endian bytes, cells as one list of counts
+//! VTK's legacy format, `.vtk`: unstructured grids, and the arrays of structured points, in text or in big endian bytes, cells as one list of counts
 //! and nodes or, from version 5, as offsets and connectivity.
 
 use glam::DVec3;
@@ -9,11 +9,18 @@ use crate::numbers::Scalar;
 
 mod scan;
 
-use scan::{Block, BlockType, Scanner};
+pub(crate) use scan::Block;
+use scan::{BlockType, Scanner};
+
+/// The kinds of data set that are read.
+const GRID_DATASET: &str = "UNSTRUCTURED_GRID";
+pub(crate) const POINTS_DATASET: &str = "STRUCTURED_POINTS";
 
 /// Where everything lies in a file.
 #[derive(Default)]
-struct Legacy<'a> {
+pub(crate) struct Legacy<'a> {
+    /// The lattice of structured points.
+    pub(crate) lattice: Lattice,
     points: Option<Block<'a>>,
     cells: Option<CellBlocks<'a>>,
     types: Option<Block<'a>>,
@@ -21,6 +28,19 @@ struct Legacy<'a> {
     blocks: Vec<Block<'a>>,
     num_points: usize,
     num_cells: usize,
+}
+
+/// Points in rows and columns.
+pub(crate) struct Lattice {
+    pub(crate) dims: Option<[usize; 3]>,
+    pub(crate) spacing: [f64; 3],
+    pub(crate) origin: [f64; 3],
+}
+
+impl Default for Lattice {
+    fn default() -> Self {
+        Self { dims: None, spacing: [1.0; 3], origin: [0.0; 3] }
+    }
 }
 
 enum CellBlocks<'a> {
@@ -35,12 +55,13 @@ pub(super) fn with_parts<R>(
     bytes: &[u8],
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
-    let legacy = Legacy::parse(bytes)?;
-    run(&[Part { path: None, piece: Box::new(legacy) }])
+    let legacy = Legacy::parse(bytes, GRID_DATASET)?;
+    run(&[Part::new(None, legacy)])
 }
 
 impl<'a> Legacy<'a> {
-    fn parse(bytes: &'a [u8]) -> Result<Self, Problem> {
+    /// Finds everything in a file of one kind of data set.
+    pub(crate) fn parse(bytes: &'a [u8], dataset: &str) -> Result<Self, Problem> {
         let mut scanner = Scanner::new(bytes);
         if !scanner.line().starts_with(b"# vtk DataFile Version") {
             return Err(Problem::missing("first line", "'# vtk DataFile Version'"));
@@ -60,8 +81,8 @@ impl<'a> Legacy<'a> {
             match keyword.as_str() {
                 "DATASET" => {
                     let found = scanner.expect("DATASET")?;
-                    if !found.eq_ignore_ascii_case("UNSTRUCTURED_GRID") {
-                        return Err(Problem::field("DATASET", quoted(found), "UNSTRUCTURED_GRID"));
+                    if !found.eq_ignore_ascii_case(dataset) {
+                        return Err(Problem::field("DATASET", quoted(found), dataset));
                     }
                     has_dataset = true;
                 }
@@ -75,15 +96,48 @@ impl<'a> Legacy<'a> {
                     place = Some(if points { Place::Points } else { Place::Cells });
                 }
                 "METADATA" => scanner.skip_metadata(),
+                "DIMENSIONS" | "SPACING" | "ASPECT_RATIO" | "ORIGIN" if dataset == POINTS_DATASET => {
+                    legacy.lattice(&keyword, &mut scanner)?;
+                }
                 "POINTS" | "CELLS" | "CELL_TYPES" => legacy.geometry(&keyword, &mut scanner)?,
                 "FIELD" => legacy.fields(place, &mut scanner)?,
                 _ => legacy.attribute(&keyword, place, &mut scanner)?,
             }
         }
         if !has_dataset {
-            return Err(Problem::missing("DATASET", "UNSTRUCTURED_GRID"));
+            return Err(Problem::missing("DATASET", dataset));
         }
         Ok(legacy)
+    }
+
+    /// The arrays, each with its numbers.
+    pub(crate) fn arrays_and_blocks(&self) -> impl Iterator<Item = (&PieceArray, Block<'a>)> {
+        self.arrays.iter().zip(self.blocks.iter().copied())
+    }
+
+    fn lattice(&mut self, keyword: &str, scanner: &mut Scanner<'a>) -> Result<(), Problem> {
+        if keyword != "DIMENSIONS" {
+            let list = if keyword == "ORIGIN" { &mut self.lattice.origin } else { &mut self.lattice.spacing };
+            for number in list {
+                *number = scanner.number(keyword)?;
+            }
+            return Ok(());
+        }
+        let mut dims = [0; 3];
+        for size in &mut dims {
+            *size = scanner.count(keyword)?;
+        }
+        let shown = || quoted(dims.map(|n| n.to_string()).join(" "));
+        let product =
+            |each: fn(usize) -> usize| dims.iter().try_fold(1_usize, |all, &n| all.checked_mul(each(n)));
+        let num_points = product(|n| n).filter(|&points| points > 0 && points <= isize::MAX as usize);
+        self.num_points = num_points.ok_or_else(|| {
+            Problem::field(keyword, shown(), "at least 1 sample along each axis, that can be addressed")
+        })?;
+        // A flat axis has one layer of cells.
+        self.num_cells = product(|n| (n - 1).max(1)).unwrap_or(0);
+        self.lattice.dims = Some(dims);
+        Ok(())
     }
 
     fn geometry(&mut self, keyword: &str, scanner: &mut Scanner<'a>) -> Result<(), Problem> {
@@ -348,5 +402,11 @@ impl Piece for Legacy<'_> {
         let block = self.blocks[array];
         let read = || block.numbers()?.reals(block.scalar, block.count);
         read().map_err(|problem: Problem| problem.of_array(&self.arrays[array].array.name))
+    }
+
+    fn varies(&self, array: usize, seen: &mut Vec<f64>) -> Result<bool, Problem> {
+        let (block, array) = (self.blocks[array], &self.arrays[array].array);
+        let mut read = || block.numbers()?.vary(block.scalar, block.count, array.components, seen);
+        read().map_err(|problem: Problem| problem.of_array(&array.name))
     }
 }

@@ -1,14 +1,15 @@
 //! VTK's collection, `.pvd`: names the files of each time step, relative to its own folder.
 //!
 //! Steps come by ascending time, whatever their order in the file. A step of several files, its parts, is joined as
-//! the pieces of a `.pvtu` are; each of them must be a `.vtu` then.
+//! the pieces of a `.pvtu` are; what has no cells of volume is left out then.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::{GridFile, GridFormat, GridOptions, Part, format_of, join, pvtu, with_parts_of};
 use crate::bytes::load;
 use crate::error::{Problem, ReadError, quoted};
-use crate::vtk_xml::{Document, Element};
+use crate::vtk_xml::{Document, Element, XmlBytes};
 
 /// One time of a series, and where its grid is.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +50,7 @@ impl TimeStep {
     ) -> Result<R, Problem> {
         match &self.files[..] {
             [file] => {
-                let read = format_of(file).and_then(|format| with_parts_of(file, format, run));
+                let read = format_of(file).and_then(|format| with_parts_of(file, format, None, run));
                 read.map_err(|problem| problem.of_part(file))
             }
             files => pvtu::with_files(files, |parts| run(GridFormat::Pvtu, parts)),
@@ -57,28 +58,39 @@ impl TimeStep {
     }
 }
 
-/// Opens the first time step of a collection, and runs something on its parts.
-pub(super) fn with_first_step<R>(
+/// Opens a time step of a collection, and runs something on its parts.
+pub(super) fn with_step<R>(
     path: &Path,
+    step: usize,
     run: impl FnOnce(&[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
-    // There is at least one.
-    steps(path)?.remove(0).with_parts(|_, parts| run(parts))
+    let mut steps = steps(path)?;
+    if step >= steps.len() {
+        return Err(Problem::field("time step asked for", step, format!("0 to {}", steps.len() - 1)));
+    }
+    steps.swap_remove(step).with_parts(|_, parts| run(parts))
 }
 
 fn steps(path: &Path) -> Result<Vec<TimeStep>, Problem> {
-    let bytes = load(path)?;
+    let bytes = XmlBytes::new(load(path)?)?;
     let document = Document::parse(&bytes, "Collection")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut entries: Vec<(f64, PathBuf)> =
         document.all("DataSet").map(|entry| entry_of(entry, folder)).collect::<Result<_, _>>()?;
     entries.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let mut steps: Vec<TimeStep> = Vec::new();
+    let mut seen = HashSet::new();
     for (time, file) in entries {
+        if steps.last().is_none_or(|last| last.time != time) {
+            seen.clear();
+        }
         match steps.last_mut() {
+            // A run that was restarted writes a step again.
+            Some(last) if last.time == time && seen.contains(&file) => {}
             Some(last) if last.time == time => last.files.push(file),
             _ => steps.push(TimeStep { time, files: vec![file] }),
         }
+        seen.extend(steps.last().and_then(|last| last.files.last()).cloned());
     }
     if steps.is_empty() { Err(Problem::missing("DataSet", "at least one")) } else { Ok(steps) }
 }
@@ -90,5 +102,8 @@ fn entry_of(entry: &Element, folder: &Path) -> Result<(f64, PathBuf), Problem> {
     let number: Option<f64> = time.trim().parse().ok();
     let number = number.filter(|time| time.is_finite());
     let number = number.ok_or_else(|| Problem::field("timestep", quoted(time), "a finite number"))?;
-    Ok((number, folder.join(file)))
+    let path = folder.join(&file);
+    // Windows writes other separators.
+    let path = if path.exists() { path } else { folder.join(file.replace('\\', "/")) };
+    Ok((number, path))
 }

@@ -16,6 +16,8 @@ pub(super) struct VtuPiece<'a> {
     arrays: Vec<PieceArray>,
     /// The elements of the arrays, and the type of their numbers.
     elements: Vec<(&'a Element<'a>, Scalar)>,
+    /// Arrays that hold no numbers, by their names.
+    others: Vec<(String, &'a Element<'a>)>,
 }
 
 /// Opens the content of a file and runs something on its pieces.
@@ -25,7 +27,7 @@ pub(super) fn with_parts<R>(
 ) -> Result<R, Problem> {
     let document = Document::parse(bytes, "UnstructuredGrid")?;
     let pieces = pieces(&document)?.into_iter();
-    let parts: Vec<_> = pieces.map(|piece| Part { path: None, piece: Box::new(piece) }).collect();
+    let parts: Vec<_> = pieces.map(|piece| Part::new(None, piece)).collect();
     run(&parts)
 }
 
@@ -45,8 +47,15 @@ impl<'a> VtuPiece<'a> {
             element.number(name)?.ok_or_else(|| Problem::missing(name, "a whole number for each piece"))
         };
         let (num_points, num_cells) = (count("NumberOfPoints")?, count("NumberOfCells")?);
-        let mut piece =
-            Self { document, element, num_points, num_cells, arrays: Vec::new(), elements: Vec::new() };
+        let mut piece = Self {
+            document,
+            element,
+            num_points,
+            num_cells,
+            arrays: Vec::new(),
+            elements: Vec::new(),
+            others: Vec::new(),
+        };
         for (section, place) in [("PointData", Place::Points), ("CellData", Place::Cells)] {
             for section in document.children(element, section) {
                 piece.add_arrays(section, place)?;
@@ -60,15 +69,15 @@ impl<'a> VtuPiece<'a> {
         let active = section.attribute("Scalars")?;
         for element in self.document.children(section, "DataArray") {
             let name = element.attribute("Name")?.unwrap_or_default();
-            let scalar = element.scalar().map_err(|problem| problem.of_array(&name))?;
-            let components = element.number("NumberOfComponents")?.unwrap_or(1);
-            let components = usize::try_from(components).ok().filter(|&components| components > 0);
-            let components = components
-                .ok_or_else(|| Problem::field("NumberOfComponents", "0", "at least 1").of_array(&name))?;
-            let is_active = active.as_deref() == Some(name.as_str());
-            let array = GridArray { name, place, components, scalar: scalar.name() };
-            self.arrays.push(PieceArray { array, is_active });
-            self.elements.push((element, scalar));
+            match number_type(element) {
+                Ok((scalar, components)) => {
+                    let is_active = active.as_deref() == Some(name.as_str());
+                    let array = GridArray { name, place, components, scalar: scalar.name() };
+                    self.arrays.push(PieceArray { array, is_active });
+                    self.elements.push((element, scalar));
+                }
+                Err(_) => self.others.push((name, element)),
+            }
         }
         Ok(())
     }
@@ -85,10 +94,26 @@ impl<'a> VtuPiece<'a> {
         Err(Problem::missing(name.unwrap_or(section), format!("a DataArray in {section}")))
     }
 
-    fn open(&self, element: &Element<'a>, scalar: Scalar, count: usize) -> Result<Numbers<'a>, Problem> {
+    fn open(&self, element: &'a Element<'a>, scalar: Scalar, count: usize) -> Result<Numbers<'a>, Problem> {
         // A count that overflows is no length that a file could have.
         let bytes = (count as u64).saturating_mul(scalar.bytes());
         self.document.numbers(element, bytes)
+    }
+
+    /// Opens an array of values and runs something on its numbers.
+    fn with_numbers<R>(
+        &self,
+        array: usize,
+        run: impl FnOnce(Numbers<'a>, Scalar, usize) -> Result<R, Problem>,
+    ) -> Result<R, Problem> {
+        let GridArray { name, place, components, .. } = &self.arrays[array].array;
+        let tuples = if *place == Place::Points { self.num_points } else { self.num_cells };
+        let (element, scalar) = self.elements[array];
+        let read = || {
+            let count = super::count(tuples, *components)?;
+            run(self.open(element, scalar, count)?, scalar, count)
+        };
+        read().map_err(|problem| problem.of_array(name))
     }
 
     /// Whole numbers that describe cells.
@@ -107,7 +132,33 @@ impl<'a> VtuPiece<'a> {
     }
 }
 
+/// The type of an array's numbers, and how many make a value.
+fn number_type(element: &Element) -> Result<(Scalar, usize), Problem> {
+    let (scalar, components) = (element.scalar()?, element.components()?);
+    match usize::try_from(components) {
+        Ok(components) if components > 0 => Ok((scalar, components)),
+        _ => Err(Problem::field("NumberOfComponents", components, "at least 1")),
+    }
+}
+
 impl Piece for VtuPiece<'_> {
+    fn notes(&self) -> Vec<String> {
+        let why = |(name, element): &(String, &Element)| {
+            let problem = number_type(element).err()?.of_array(name);
+            Some(format!("array left out: {problem}"))
+        };
+        self.others.iter().filter_map(why).collect()
+    }
+
+    fn check_left_out(&self, name: &str) -> Result<(), Problem> {
+        match self.others.iter().find(|(own, _)| own == name) {
+            Some((name, element)) => {
+                number_type(element).map(|_| ()).map_err(|problem| problem.of_array(name))
+            }
+            None => Ok(()),
+        }
+    }
+
     fn num_points(&self) -> u64 {
         self.num_points
     }
@@ -144,13 +195,11 @@ impl Piece for VtuPiece<'_> {
     }
 
     fn values(&self, array: usize) -> Result<Vec<f64>, Problem> {
-        let GridArray { name, place, components, .. } = &self.arrays[array].array;
-        let tuples = if *place == Place::Points { self.num_points } else { self.num_cells };
-        let (element, scalar) = self.elements[array];
-        let read = || {
-            let count = super::count(tuples, *components)?;
-            self.open(element, scalar, count)?.reals(scalar, count)
-        };
-        read().map_err(|problem| problem.of_array(name))
+        self.with_numbers(array, |numbers, scalar, count| numbers.reals(scalar, count))
+    }
+
+    fn varies(&self, array: usize, seen: &mut Vec<f64>) -> Result<bool, Problem> {
+        let components = self.arrays[array].array.components;
+        self.with_numbers(array, |numbers, scalar, count| numbers.vary(scalar, count, components, seen))
     }
 }

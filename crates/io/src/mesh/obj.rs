@@ -14,6 +14,8 @@ use crate::error::Problem;
 
 pub(super) fn read(bytes: &[u8], surface: &mut Surface) -> Result<(), Problem> {
     let counts = Counts::default();
+    // A byte order mark is no part of the first statement.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut statements = Statements { rest: bytes, statement: Vec::new(), at: 0, counts: &counts };
     let options = LoadOptions::default();
     // Materials are not used: none is looked for.
@@ -100,28 +102,33 @@ struct Statements<'a> {
 }
 
 impl Statements<'_> {
-    /// Goes to the next statement of a kind that counts; lines that end in a backslash go on in the next one.
+    /// The next line without its end, which may be CR, LF or both.
+    fn line(&mut self) -> &[u8] {
+        let end = self.rest.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+        let (line, rest) = self.rest.split_at(end.unwrap_or(self.rest.len()));
+        let after = if rest.starts_with(b"\r\n") { 2 } else { rest.len().min(1) };
+        self.rest = &rest[after..];
+        add(&self.counts.line, 1);
+        line
+    }
+
+    /// Goes to the next statement of a kind that counts. It goes on in the next line where it ends in a backslash; a
+    /// comment does not, nor does a name.
     fn advance(&mut self) {
         self.statement.clear();
         self.at = 0;
         while !self.rest.is_empty() {
-            let mut joined = Vec::new();
-            loop {
-                let end = self.rest.iter().position(|&byte| byte == b'\n');
-                let (line, rest) = self.rest.split_at(end.map_or(self.rest.len(), |end| end + 1));
-                self.rest = rest;
-                add(&self.counts.line, 1);
-                let line = line.trim_ascii_end();
-                let Some(part) = line.strip_suffix(b"\\").filter(|_| !rest.is_empty()) else {
-                    joined.extend_from_slice(line);
-                    break;
-                };
-                joined.extend_from_slice(part);
-                joined.push(b' ');
+            let mut statement = without_comment(self.line()).to_vec();
+            if !is_of_surfaces(&statement) {
+                continue;
             }
-            if self.is_wanted(&mut joined) {
-                joined.push(b'\n');
-                self.statement = joined;
+            while let Some(part) = statement.strip_suffix(b"\\").filter(|_| !self.rest.is_empty()) {
+                statement = [part, b" "].concat();
+                statement.extend_from_slice(without_comment(self.line()));
+            }
+            if self.is_wanted(&mut statement) {
+                statement.push(b'\n');
+                self.statement = statement;
                 return;
             }
         }
@@ -131,16 +138,19 @@ impl Statements<'_> {
     fn is_wanted(&self, statement: &mut Vec<u8>) -> bool {
         let words = || statement.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         let num_words = words().count();
-        match words().next().unwrap_or_default() {
+        match keyword(statement).as_slice() {
             b"v" => {
                 add(&self.counts.vertices, 1);
                 // Three numbers, maybe a fourth; what comes after three and is more than one is a colour.
-                if num_words > 5 {
-                    *statement = words().take(4).collect::<Vec<_>>().join(&b' ');
-                }
+                let kept = if num_words > 5 { 4 } else { num_words };
+                *statement =
+                    [&b"v"[..]].into_iter().chain(words().take(kept).skip(1)).collect::<Vec<_>>().join(&b' ');
                 true
             }
-            b"f" => true,
+            b"f" => {
+                *statement = [&b"f"[..]].into_iter().chain(words().skip(1)).collect::<Vec<_>>().join(&b' ');
+                true
+            }
             b"l" => {
                 add(&self.counts.lines, 1);
                 false
@@ -149,13 +159,30 @@ impl Statements<'_> {
                 add(&self.counts.points, num_words as u64 - 1);
                 false
             }
-            b"curv" | b"curv2" | b"surf" => {
+            _ => {
                 add(&self.counts.free_forms, 1);
                 false
             }
-            _ => false,
         }
     }
+}
+
+/// The first word of a statement in lower case.
+fn keyword(statement: &[u8]) -> Vec<u8> {
+    let mut words = statement.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    words.next().unwrap_or_default().to_ascii_lowercase()
+}
+
+/// Whether a statement makes points, faces, lines or free-form shapes.
+fn is_of_surfaces(statement: &[u8]) -> bool {
+    matches!(keyword(statement).as_slice(), b"v" | b"f" | b"l" | b"p" | b"curv" | b"curv2" | b"surf")
+}
+
+/// A line up to a comment, which starts a word with `#`; without blanks at its end.
+fn without_comment(line: &[u8]) -> &[u8] {
+    let is_start = |&i: &usize| line[i] == b'#' && (i == 0 || line[i - 1].is_ascii_whitespace());
+    let end = (0..line.len()).find(is_start).unwrap_or(line.len());
+    line[..end].trim_ascii_end()
 }
 
 impl Read for Statements<'_> {

@@ -18,6 +18,24 @@ pub(crate) struct Page {
     pub(crate) bytes: Vec<u8>,
 }
 
+impl Page {
+    /// One channel of a picture if that is asked for; the others have been read as the file has them.
+    pub(super) fn channel(self, channel: Option<usize>) -> Result<Self, Problem> {
+        let channels = self.sample.channels();
+        match channel {
+            None => Ok(self),
+            Some(channel) if channel >= channels => {
+                Err(Problem::field("channel asked for", channel, format!("0 to {}", channels - 1)))
+            }
+            Some(_) if channels == 1 => Ok(self),
+            Some(channel) => {
+                let bytes = self.bytes.chunks_exact(channels).map(|color| color[channel]).collect();
+                Ok(Self { sample: SampleType::U8, bytes, ..self })
+            }
+        }
+    }
+}
+
 /// No image compression that is read here gives more than this many bytes for one.
 pub(super) const MAX_EXPANSION: u64 = 4096;
 
@@ -40,6 +58,14 @@ pub(super) fn check_plausible(
         return Err(Problem::TooLarge { required, max: max_bytes });
     }
     Ok(required as u64)
+}
+
+/// Numbers of 1 to 8 bits, whose rows start at whole bytes, as bytes.
+pub(super) fn unpacked(packed: &[u8], bits: usize, width: usize) -> Vec<u8> {
+    let rows = packed.chunks_exact((width * bits).div_ceil(8).max(1));
+    let number =
+        |row: &[u8], first: usize| row[first / 8] >> (8 - bits - first % 8) & (u8::MAX >> (8 - bits));
+    rows.flat_map(|row| (0..width).map(move |x| number(row, x * bits))).collect()
 }
 
 /// Decodes a JPEG image: gray, or colour as RGB.
@@ -72,4 +98,17 @@ pub(super) fn decode_jpeg(bytes: &[u8], max_bytes: u64) -> Result<Page, Problem>
     }
     let sample = if is_gray { SampleType::U8 } else { SampleType::Rgb8 };
     Ok(Page { width, height, sample, bytes: pixels })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_few_bits_start_each_row_at_a_byte() {
+        assert_eq!(unpacked(&[0b1010_0000, 0b0100_0000], 1, 3), [1, 0, 1, 0, 1, 0]);
+        assert_eq!(unpacked(&[0x12, 0x30], 4, 3), [1, 2, 3]);
+        assert_eq!(unpacked(&[0b1101_1000], 2, 3), [3, 1, 2]);
+        assert_eq!(unpacked(&[7, 9], 8, 2), [7, 9]);
+    }
 }

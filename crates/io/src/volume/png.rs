@@ -1,4 +1,6 @@
-//! One PNG image: gray of 8 and 16 bits, RGB and RGBA of 8 bits; others are converted, with a note.
+//! One PNG image: gray of 8 and 16 bits, RGB and RGBA of 8 bits; others are converted, with a note. As samples of a
+//! volume, numbers of colours in a palette are the values, and opacities beside gray are not used; as a picture, both
+//! are colours.
 //!
 //! Only the chunks that make the picture are handed to the decoder, so that nothing else in a file (text,
 //! profiles, animation) can do harm.
@@ -9,7 +11,7 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Limits, Transformations};
 use volery_scene::SampleType;
 
-use super::image::{Page, check_plausible};
+use super::image::{Page, check_plausible, unpacked};
 use crate::bytes::{load, reserve};
 use crate::error::Problem;
 use crate::layout::ByteOrder;
@@ -19,10 +21,22 @@ const WHAT: &str = "the PNG image";
 
 /// Reads the picture of a PNG file.
 pub(crate) fn read_png(path: &Path) -> Result<Page, Problem> {
-    decode(&load(path)?, u64::MAX, &mut Vec::new())
+    decode(&load(path)?, u64::MAX, Use::Picture, &mut Vec::new())
 }
 
-pub(super) fn decode(bytes: &[u8], max_bytes: u64, notes: &mut Vec<String>) -> Result<Page, Problem> {
+/// What an image is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Use {
+    Picture,
+    Samples,
+}
+
+pub(super) fn decode(
+    bytes: &[u8],
+    max_bytes: u64,
+    use_as: Use,
+    notes: &mut Vec<String>,
+) -> Result<Page, Problem> {
     let chunks = picture_chunks(bytes)?;
     let limits = Limits { bytes: chunks.len().saturating_mul(64).max(1 << 20) };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(chunks), limits);
@@ -30,14 +44,20 @@ pub(super) fn decode(bytes: &[u8], max_bytes: u64, notes: &mut Vec<String>) -> R
     let header = decoder.read_header_info().map_err(damaged)?;
     let (width, height) = (header.width, header.height);
     let (color, depth) = (header.color_type, header.bit_depth);
-    let gray16 = (color, depth) == (ColorType::Grayscale, BitDepth::Sixteen);
-    let mut transformations = Transformations::EXPAND;
+    let has_alpha = color == ColorType::GrayscaleAlpha && use_as == Use::Samples;
+    let gray16 = depth == BitDepth::Sixteen && (color == ColorType::Grayscale || has_alpha);
+    let has_labels = use_as == Use::Samples && color == ColorType::Indexed;
+    let mut transformations = if has_labels { Transformations::IDENTITY } else { Transformations::EXPAND };
+    if has_labels {
+        notes.push("the values are numbers of colours in a palette, which is not used".to_owned());
+    }
     if depth == BitDepth::Sixteen && !gray16 {
         transformations |= Transformations::STRIP_16;
         notes.push("the colours have 16 bits a channel; their upper 8 are used".to_owned());
     }
     let pixel_bytes = match color {
         ColorType::Grayscale => 1 + usize::from(gray16),
+        ColorType::Indexed if has_labels => 1,
         ColorType::Rgb | ColorType::Indexed => 3,
         ColorType::Rgba | ColorType::GrayscaleAlpha => 4,
     };
@@ -54,6 +74,12 @@ pub(super) fn decode(bytes: &[u8], max_bytes: u64, notes: &mut Vec<String>) -> R
         ColorType::Grayscale => SampleType::U8,
         ColorType::Rgb => SampleType::Rgb8,
         ColorType::Rgba => SampleType::Rgba8,
+        ColorType::GrayscaleAlpha if use_as == Use::Samples => {
+            notes.push("the opacities beside the gray values are not used".to_owned());
+            let each = 1 + usize::from(gray16);
+            pixels = pixels.chunks_exact(2 * each).flat_map(|pixel| &pixel[..each]).copied().collect();
+            if gray16 { SampleType::U16 } else { SampleType::U8 }
+        }
         ColorType::GrayscaleAlpha => {
             pixels = pixels
                 .as_chunks::<2>()
@@ -62,6 +88,10 @@ pub(super) fn decode(bytes: &[u8], max_bytes: u64, notes: &mut Vec<String>) -> R
                 .flat_map(|&[gray, alpha]| [gray, gray, gray, alpha])
                 .collect();
             SampleType::Rgba8
+        }
+        ColorType::Indexed if has_labels => {
+            pixels = unpacked(&pixels, depth as usize, width as usize);
+            SampleType::U8
         }
         ColorType::Indexed => return Err(Problem::damaged(WHAT, "its palette was not applied")),
     };

@@ -1,5 +1,5 @@
 //! Raw files: samples and nothing else. Dims, type and spacing come from the caller, or from a name in the
-//! manner of the Open SciVis Datasets, `engine_256x256x128_uint8.raw`.
+//! manner of the Open SciVis Datasets, `engine_256x256x128_uint8.raw`, whose words may stand in any order.
 
 use std::path::Path;
 
@@ -7,6 +7,7 @@ use super::{Decoded, compression_of_name, lower_name};
 use crate::bytes::{self, Compression, has_more, open_stream, read_samples, samples_at};
 use crate::error::{Problem, quoted};
 use crate::layout::{Element, Layout, checked_spacing};
+use crate::raster::wanted_volume;
 use crate::volume::ReadOptions;
 
 pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Problem> {
@@ -20,6 +21,10 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Proble
     };
     let layout = Layout::new("dims", dims, element.sample, element.order, options)?;
     let mut notes = Vec::new();
+    wanted_volume(1, options, &mut notes)?;
+    if let Some(channel) = options.channel.filter(|&channel| channel > 0) {
+        return Err(Problem::field("channel asked for", channel, "0: raw files have one"));
+    }
     let spacing = checked_spacing("spacing", [1.0; 3], layout.dims, options, &mut notes)?;
     let compression = compression_of_name(path);
     let expected = layout.num_bytes();
@@ -39,15 +44,16 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Proble
         }
         samples
     };
-    Ok(Decoded { dims: layout.dims, spacing, samples, array: None, notes })
+    Ok(Decoded::new(layout.dims, spacing, samples, notes))
 }
 
 /// Dims and type as the name gives them: `.._256x256x128_uint8.raw`.
 fn from_name(name: &str) -> Result<([u64; 3], Element), Problem> {
     let stem = name.split_once(".raw").map_or(name, |(stem, _)| stem);
-    let mut words = stem.rsplit('_');
-    let element = words.next().and_then(|word| word.parse().ok());
-    let dims = words.next().and_then(parse_dims);
+    // Of several words that would do, the last ones.
+    let words = || stem.rsplit(['_', '-', '.', ' ']);
+    let element = words().find_map(|word| word.parse().ok());
+    let dims = words().find_map(parse_dims);
     dims.zip(element).ok_or_else(|| {
         Problem::field("file name", quoted(name), "one such as name_256x256x128_uint8.raw, or dims and dtype")
     })
@@ -71,6 +77,16 @@ mod tests {
         assert_eq!((dims, element.sample), ([128, 64, 3], SampleType::U8));
         let (_, element) = from_name("tooth16_103x94x161_uint16be.raw").unwrap();
         assert_eq!(element, Element { sample: SampleType::U16, order: ByteOrder::Big });
+        for name in [
+            "v-5x4x3-uint16.raw",
+            "v.5x4x3_uint16.raw",
+            "v_uint16_5x4x3.raw",
+            "v_5x4x3_u16_le.raw",
+            "v_5x4x3_ushort.raw",
+        ] {
+            let (dims, element) = from_name(name).unwrap();
+            assert_eq!((dims, element.sample), ([5, 4, 3], SampleType::U16), "{name}");
+        }
         for name in ["a.raw", "a_1x2_uint8.raw", "a_1x2x3x4_uint8.raw", "a_1x2x3_int7.raw", "_.raw", ""] {
             assert!(from_name(name).is_err(), "{name}");
         }

@@ -2,7 +2,7 @@
 //!
 //! Row 0 of an image is y = 0, the first slice z = 0. Slices come in natural order of their names: runs of
 //! digits compare as numbers, so `slice10` follows `slice9`. All must have one size and type. Spacing is 1
-//! unless the caller says otherwise.
+//! unless a TIFF of all slices or the caller says otherwise.
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
@@ -11,10 +11,12 @@ use bytemuck::Pod;
 use volery_scene::{Sample, SampleType, Samples};
 
 use super::image::{Page, decode_jpeg};
-use super::{Decoded, Format, lower_name, png, tiff};
+use super::tiff::{self, Scale};
+use super::{Decoded, Format, foreign, lower_name, png};
 use crate::bytes::load;
 use crate::error::Problem;
 use crate::layout::{ByteOrder, Layout, checked_spacing, for_sample_type};
+use crate::raster::wanted_volume;
 use crate::volume::ReadOptions;
 
 pub(super) fn read_file(path: &Path, format: Format, options: &ReadOptions) -> Result<Decoded, Problem> {
@@ -24,26 +26,32 @@ pub(super) fn read_file(path: &Path, format: Format, options: &ReadOptions) -> R
 }
 
 pub(super) fn read_folder(path: &Path, options: &ReadOptions) -> Result<Decoded, Problem> {
-    let mut slices = Vec::new();
-    let mut others = 0;
+    let (mut slices, mut others) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(path).map_err(Problem::Io)? {
         let file = entry.map_err(Problem::Io)?.path();
         match slice_format(&file) {
             Some(format) => slices.push((file, format)),
-            None => others += 1,
+            None => others.push(file),
         }
     }
     if slices.is_empty() {
+        others.sort();
+        if let Some((format, way)) = foreign::format_of_folder(path, &others) {
+            return Err(Problem::field("format", format!("{format} in a folder"), way));
+        }
         let found = "a folder without slices";
         return Err(Problem::Kind { found, expected: "a volume file or a folder of PNG or TIFF slices" });
     }
     slices.sort_by(|(a, _), (b, _)| natural_order(a, b));
     let mut stack = Stack::new(options);
-    if others > 0 {
+    if !others.is_empty() {
+        let others = others.len();
         stack.notes.push(format!("{others} files of the folder are no PNG or TIFF and are not used"));
     }
     for (file, format) in slices {
         stack.add_file(&file, format).map_err(|problem| problem.of_part(&file))?;
+        // Distances of one slice say nothing of the next.
+        stack.scale.spacing = None;
     }
     stack.finish()
 }
@@ -105,30 +113,39 @@ struct Stack<'a> {
     num_pages: u64,
     values: Box<dyn Grow>,
     notes: Vec<String>,
+    /// What the file says of distances and directions; nothing for a folder, whose files know no distance of slices.
+    scale: Scale,
 }
 
 impl<'a> Stack<'a> {
     fn new(options: &'a ReadOptions) -> Self {
-        Self { options, shape: None, num_pages: 0, values: Box::new(Vec::<u8>::new()), notes: Vec::new() }
+        let values = Box::new(Vec::<u8>::new());
+        Self { options, shape: None, num_pages: 0, values, notes: Vec::new(), scale: Scale::default() }
     }
 
     fn add_file(&mut self, path: &Path, format: Format) -> Result<(), Problem> {
         let bytes = load(path)?;
         let max_bytes = self.options.max_bytes;
+        let mut notes = Vec::new();
         match format {
-            Format::Jpeg => self.add(decode_jpeg(&bytes, max_bytes)?),
+            Format::Jpeg => self.add_picture(decode_jpeg(&bytes, max_bytes)?)?,
             Format::Png => {
-                let mut notes = Vec::new();
-                let page = png::decode(&bytes, max_bytes, &mut notes)?;
-                for note in notes {
-                    if !self.notes.contains(&note) {
-                        self.notes.push(note);
-                    }
-                }
-                self.add(page)
+                self.add_picture(png::decode(&bytes, max_bytes, png::Use::Samples, &mut notes)?)?
             }
-            _ => tiff::for_each_page(&bytes, max_bytes, &mut |page| self.add(page)),
+            _ => {
+                self.scale = tiff::read_slices(&bytes, self.options, &mut notes, &mut |page| self.add(page))?;
+            }
         }
+        // The slices of a folder often say the same.
+        notes.retain(|note| !self.notes.contains(note));
+        self.notes.append(&mut notes);
+        Ok(())
+    }
+
+    /// Adds a picture, or the channel of it that is asked for; a file of one has one time.
+    fn add_picture(&mut self, page: Page) -> Result<(), Problem> {
+        wanted_volume(1, self.options, &mut self.notes)?;
+        self.add(page.channel(self.options.channel)?)
     }
 
     fn add(&mut self, page: Page) -> Result<(), Problem> {
@@ -157,9 +174,12 @@ impl<'a> Stack<'a> {
 
     fn finish(mut self) -> Result<Decoded, Problem> {
         let layout = self.layout(self.options)?;
-        let spacing = checked_spacing("spacing", [1.0; 3], layout.dims, self.options, &mut self.notes)?;
+        let spacing = self.scale.spacing.unwrap_or([1.0; 3]);
+        let spacing = checked_spacing("spacing", spacing, layout.dims, self.options, &mut self.notes)?;
         let samples = self.values.finish();
-        Ok(Decoded { dims: layout.dims, spacing, samples, array: None, notes: self.notes })
+        let mut decoded = Decoded::new(layout.dims, spacing, samples, self.notes);
+        decoded.placement = self.scale.placement(layout.dims, spacing);
+        Ok(decoded)
     }
 }
 

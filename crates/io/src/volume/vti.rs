@@ -1,156 +1,143 @@
-//! VTK's XML image data, `.vti`: one piece; data ascii, base64 or appended (raw or base64), plain or in
-//! blocks of zlib, LZ4 or LZMA; both byte orders.
-//!
-//! The array read is the one asked for, else the active scalars, else the first that can be read; point
-//! data before cell data. Cell data become samples at the cell centres. Origin, direction and the start of
-//! the extent are not used: the first sample lies at the world's origin.
+//! VTK's XML image data: `.vti`, of one or several pieces, and `.pvti`, whose pieces are files of their own; data ascii,
+//! base64 or appended (raw or base64), plain or in blocks of zlib, LZ4 or LZMA; both byte orders.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use volery_scene::SampleType;
+use glam::{DMat3, DVec3};
 
 use super::Decoded;
+use super::image_data::{ImageArray, ImageData, ImagePiece};
 use crate::bytes::load;
-use crate::error::{Problem, quoted};
-use crate::layout::{Layout, checked_spacing};
-use crate::numbers::Scalar;
+use crate::error::Problem;
 use crate::volume::ReadOptions;
-use crate::vtk_xml::{Document, Element};
+use crate::vtk_xml::{Document, Element, XmlBytes};
 
 /// The sections of data, and whether they lie on cells.
 const SECTIONS: [(&str, bool); 2] = [("PointData", false), ("CellData", true)];
 
-/// The image and its arrays.
-struct Image<'a> {
-    document: &'a Document<'a>,
-    arrays: Vec<DataArray<'a>>,
-    /// Names of the active scalars of points and of cells.
-    active: [Option<String>; 2],
-}
-
-/// One `DataArray` of the piece.
-struct DataArray<'a> {
-    on_cells: bool,
-    name: Option<String>,
-    components: u64,
-    element: &'a Element<'a>,
-}
+/// An image of more pieces in files is refused: all of them are in memory or mapped at once.
+const MAX_FILES: usize = 4096;
 
 pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Problem> {
-    let bytes = load(path)?;
+    let bytes = XmlBytes::new(load(path)?)?;
     let document = Document::parse(&bytes, "ImageData")?;
-    let image = Image::new(&document)?;
-    let array = image.choose(options.array.as_deref())?;
-    let mut notes = Vec::new();
-    let dims = image.dims(array, &mut notes)?;
-    let layout = Layout::new("Extent", dims, array.sample_type()?, document.order(), options)?;
-    let spacing = checked_spacing("Spacing", image.spacing()?, layout.dims, options, &mut notes)?;
-    let samples = document.numbers(array.element, layout.num_bytes())?.samples(&layout)?;
-    Ok(Decoded { dims: layout.dims, spacing, samples, array: array.name.clone(), notes })
+    let pieces = pieces(&document, None)?;
+    image(&document, "ImageData", pieces)?.read(options)
 }
 
-impl<'a> Image<'a> {
-    fn new(document: &'a Document<'a>) -> Result<Self, Problem> {
-        let mut image = Self { document, arrays: Vec::new(), active: [None, None] };
-        for (name, on_cells) in SECTIONS {
-            for section in document.all(name) {
-                image.active[usize::from(on_cells)] = section.attribute("Scalars")?;
-                for element in document.children(section, "DataArray") {
-                    image.arrays.push(DataArray {
-                        on_cells,
-                        name: element.attribute("Name")?,
-                        components: element.number("NumberOfComponents")?.unwrap_or(1),
-                        element,
-                    });
-                }
-            }
-        }
-        Ok(image)
+/// Reads an image whose pieces are files.
+pub(super) fn read_parallel(path: &Path, options: &ReadOptions) -> Result<Decoded, Problem> {
+    let bytes = XmlBytes::new(load(path)?)?;
+    let document = Document::parse(&bytes, "PImageData")?;
+    let paths = piece_paths(path, &document)?;
+    let files: Vec<XmlBytes> = paths
+        .iter()
+        .map(|path| load(path).and_then(XmlBytes::new).map_err(|problem| problem.of_part(path)))
+        .collect::<Result<_, _>>()?;
+    let documents: Vec<Document> = paths
+        .iter()
+        .zip(&files)
+        .map(|(path, file)| Document::parse(file, "ImageData").map_err(|problem| problem.of_part(path)))
+        .collect::<Result<_, _>>()?;
+    let mut parts = Vec::new();
+    for (path, document) in paths.iter().zip(&documents) {
+        parts.extend(pieces(document, Some(path)).map_err(|problem| problem.of_part(path))?);
     }
+    image(&document, "PImageData", parts)?.read(options)
+}
 
-    fn choose(&self, wanted: Option<&str>) -> Result<&DataArray<'a>, Problem> {
-        let named = |name: &str, on_cells: &[bool]| {
-            let hit = |array: &&DataArray| array.name.as_deref() == Some(name);
-            on_cells.iter().find_map(|side| self.arrays.iter().filter(|a| a.on_cells == *side).find(hit))
-        };
-        if let Some(name) = wanted {
-            return named(name, &[false, true]).ok_or_else(|| {
-                let names: Vec<_> = self.arrays.iter().filter_map(|array| array.name.as_deref()).collect();
-                Problem::field("array", quoted(name), format!("one of {}", quoted(names.join(", "))))
-            });
-        }
-        let active =
-            |side: bool| self.active[usize::from(side)].as_deref().and_then(|name| named(name, &[side]));
-        let first = |side: bool, readable: bool| {
-            let fits =
-                |array: &&DataArray| array.on_cells == side && (!readable || array.sample_type().is_ok());
-            self.arrays.iter().find(fits)
-        };
-        let on = |side| active(side).or_else(|| first(side, true));
-        on(false)
-            .or_else(|| on(true))
-            .or_else(|| first(false, false).or_else(|| first(true, false)))
-            .ok_or_else(|| Problem::missing("DataArray", "one in PointData or CellData"))
+fn piece_paths(path: &Path, document: &Document) -> Result<Vec<PathBuf>, Problem> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let source = |piece: &Element| {
+        let source = piece.attribute("Source")?;
+        source.map(|name| folder.join(name)).ok_or_else(|| Problem::missing("Source", "one for each Piece"))
+    };
+    let paths: Vec<_> = document.all("Piece").map(source).collect::<Result<_, _>>()?;
+    match paths.len() {
+        0 => Err(Problem::missing("Piece", "at least one")),
+        1..=MAX_FILES => Ok(paths),
+        found => Err(Problem::field("number of pieces", found, format!("at most {MAX_FILES}"))),
     }
+}
 
-    fn dims(&self, array: &DataArray, notes: &mut Vec<String>) -> Result<[u64; 3], Problem> {
-        let pieces = self.document.all("Piece").count();
-        if pieces != 1 {
-            return Err(Problem::field("number of pieces", pieces, "1"));
-        }
-        let whole = self.document.all("ImageData").next();
-        let whole = whole.map_or(Ok(None), |image| image.numbers("WholeExtent"))?;
-        let piece = self.document.all("Piece").next();
-        let piece = piece.map_or(Ok(None), |piece| piece.numbers::<i64, 6>("Extent"))?;
-        let extent = piece.or(whole);
+/// What the root of an image says of its lattice, with its pieces; those without a point are left out.
+fn image<'a>(
+    document: &Document,
+    name: &str,
+    mut pieces: Vec<ImagePiece<'a>>,
+) -> Result<ImageData<'a>, Problem> {
+    let is_empty = |piece: &ImagePiece| piece.extent.as_chunks::<2>().0.iter().any(|[low, high]| high < low);
+    if !pieces.iter().all(is_empty) {
+        pieces.retain(|piece| !is_empty(piece));
+    }
+    if pieces.is_empty() {
+        return Err(Problem::missing("Piece", "at least one"));
+    }
+    let root = document.all(name).next();
+    let triple = |name: &str| root.map_or(Ok(None), |root| root.numbers::<f64, 3>(name));
+    let directions = root.map_or(Ok(None), |root| root.numbers::<f64, 9>("Direction"))?;
+    // In the file row by row.
+    let directions = directions.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
+    Ok(ImageData {
+        spacing: triple("Spacing")?.unwrap_or([1.0; 3]),
+        origin: triple("Origin")?.unwrap_or(DVec3::ZERO.to_array()),
+        directions,
+        pieces,
+    })
+}
+
+/// The pieces of a file, at least one.
+fn pieces<'a>(document: &'a Document<'a>, path: Option<&'a Path>) -> Result<Vec<ImagePiece<'a>>, Problem> {
+    let whole = document.all("ImageData").next();
+    let whole = whole.map_or(Ok(None), |image| image.numbers::<i64, 6>("WholeExtent"))?;
+    let mut pieces = Vec::new();
+    for element in document.all("Piece") {
+        let extent = element.numbers("Extent")?.or(whole);
         let extent = extent.ok_or_else(|| Problem::missing("WholeExtent", "six whole numbers"))?;
-        let mut dims = [0; 3];
-        for axis in 0..3 {
-            let [low, high] = [extent[2 * axis], extent[2 * axis + 1]];
-            let cells = high.checked_sub(low).and_then(|cells| u64::try_from(cells).ok());
-            let Some(cells) = cells else {
-                return Err(Problem::field("Extent", quoted(format!("{extent:?}")), "rising pairs"));
-            };
-            // A flat axis has one layer of cells.
-            dims[axis] = if array.on_cells { cells.max(1) } else { cells + 1 };
-        }
-        if array.on_cells {
-            notes.push("the array lies on cells; its values are samples at the cell centres".to_owned());
-        }
-        Ok(dims)
+        pieces.push(ImagePiece { extent, arrays: arrays(document, element)?, path });
     }
-
-    fn spacing(&self) -> Result<[f64; 3], Problem> {
-        let image = self.document.all("ImageData").next();
-        Ok(image.map_or(Ok(None), |image| image.numbers("Spacing"))?.unwrap_or([1.0; 3]))
+    if pieces.is_empty() {
+        // A file that is none: the same as one without data.
+        return Err(Problem::missing("DataArray", "one in PointData or CellData"));
     }
+    Ok(pieces)
 }
 
-impl DataArray<'_> {
-    fn sample_type(&self) -> Result<SampleType, Problem> {
-        let scalar = match self.element.scalar()? {
-            Scalar::U8 => SampleType::U8,
-            Scalar::I8 => SampleType::I8,
-            Scalar::U16 => SampleType::U16,
-            Scalar::I16 => SampleType::I16,
-            Scalar::U32 => SampleType::U32,
-            Scalar::I32 => SampleType::I32,
-            Scalar::F32 => SampleType::F32,
-            Scalar::F64 => SampleType::F64,
-            found @ (Scalar::U64 | Scalar::I64) => {
-                let expected = "an integer to 32 bits or a float";
-                return Err(Problem::field("type of DataArray", quoted(found.name()), expected));
-            }
-        };
-        match (self.components, scalar) {
-            (1, scalar) => Ok(scalar),
-            (3, SampleType::U8) => Ok(SampleType::Rgb8),
-            (4, SampleType::U8) => Ok(SampleType::Rgba8),
-            (found, _) => {
-                let type_name = self.element.attribute("type")?.unwrap_or_default();
-                let found = format!("{found} of {type_name}");
-                Err(Problem::field("NumberOfComponents", found, "1, or 3 or 4 of UInt8"))
+/// Every array of a piece, of numbers or not.
+fn arrays<'a>(document: &'a Document<'a>, piece: &'a Element<'a>) -> Result<Vec<ImageArray<'a>>, Problem> {
+    let mut arrays = Vec::new();
+    for (name, on_cells) in SECTIONS {
+        for section in document.children(piece, name) {
+            let active = section.attribute("Scalars")?;
+            for element in document.children(section, "DataArray") {
+                let name = element.attribute("Name")?;
+                let scalar = element.scalar();
+                arrays.push(ImageArray {
+                    on_cells,
+                    is_active: active.is_some() && active == name,
+                    name,
+                    components: element.components()?,
+                    scalar: scalar.or(Err(element.attribute("type")?.unwrap_or_default())),
+                    order: document.order(),
+                    open: Box::new(move |bytes| document.numbers(element, bytes)),
+                });
             }
         }
+    }
+    Ok(arrays)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_are_read_row_by_row() {
+        let text =
+            br#"<VTKFile type="ImageData" byte_order="LittleEndian"><ImageData WholeExtent="0 0 0 0 0 0"
+            Direction="0 1 0 -1 0 0 0 0 1"><Piece Extent="0 0 0 0 0 0"/></ImageData></VTKFile>"#;
+        let document = Document::parse(text, "ImageData").unwrap();
+        let image = image(&document, "ImageData", pieces(&document, None).unwrap()).unwrap();
+        assert_eq!(image.directions * DVec3::X, DVec3::new(0.0, -1.0, 0.0));
     }
 }

@@ -18,6 +18,9 @@ mod make_grid;
 mod make_mesh;
 #[path = "../readers/make_stack.rs"]
 mod make_stack;
+#[path = "../readers/make_tiff.rs"]
+#[allow(dead_code, reason = "the readers' tests use more of it")]
+mod make_tiff;
 mod memory;
 mod mutate;
 mod seeds;
@@ -161,6 +164,10 @@ families! {
     nrrd: "a.nrrd", seeds::nrrd();
     metaimage: "a.mha", seeds::metaimage();
     vti: "a.vti", seeds::vti();
+    pvti: "a.pvti", seeds::pvti();
+    structured_points: "points.vtk", seeds::structured_points();
+    tiff_axes: "axes.tif", seeds::tiff_axes();
+    nrrd_axes: "axes.nrrd", seeds::nrrd_axes();
     vtu: "a.vtu", seeds::vtu();
     pvtu: "a.pvtu", seeds::pvtu();
     pvd: "a.pvd", seeds::pvd();

@@ -11,6 +11,7 @@ use crate::make::{self, Nifti, VTI_DATA, Vti};
 use crate::make_grid::{self, CELLS, Form, Packing, usual_vtu};
 use crate::make_mesh;
 use crate::make_stack::stack;
+use crate::make_tiff;
 
 fn big() -> Vec<u8> {
     make::payload(SampleType::U16, Big)
@@ -31,7 +32,23 @@ pub(crate) fn raw_zstd() -> Vec<Vec<u8>> {
 pub(crate) fn nifti() -> Vec<Vec<u8>> {
     let scaled = Nifti { scaling: [2.0, 1.0], ..Nifti::new(SampleType::U8, Little) };
     let series = Nifti { dim: vec![4, 3, 2, 2, 2], ..Nifti::new(SampleType::U8, Little) };
-    vec![Nifti::new(SampleType::U16, Big).file(&big()), scaled.file(&[5; 12]), series.file(&[5; 24])]
+    let vector = Nifti { dim: vec![5, 3, 2, 1, 1, 2], datatype: 1024, ..Nifti::new(SampleType::U8, Little) };
+    // Both orientations hold.
+    let mut placed = vector.file(&[5; 96]);
+    (placed[252], placed[254], placed[280], placed[283]) = (1, 1, 0x80, 0x3f);
+    // The second version: zeros but for what must be there.
+    let mut second = vec![0; 556];
+    second[..12].copy_from_slice(b"\x1c\x02\0\0n+2\0\r\n\x1a\n");
+    (second[12], second[16], second[24], second[32], second[40], second[168], second[169]) =
+        (2, 3, 3, 2, 2, 0x20, 2);
+    second[104 + 15] = 0x3f;
+    vec![
+        Nifti::new(SampleType::U16, Big).file(&big()),
+        scaled.file(&[5; 12]),
+        series.file(&[5; 24]),
+        placed,
+        second,
+    ]
 }
 
 pub(crate) fn nifti_gzip() -> Vec<Vec<u8>> {
@@ -125,6 +142,79 @@ pub(crate) fn legacy_vtk() -> Vec<Vec<u8>> {
     ]
 }
 
+/// Names of pieces: one is itself, which is no piece, others are not there.
+pub(crate) fn pvti() -> Vec<Vec<u8>> {
+    let text = br#"<VTKFile type="PImageData" byte_order="LittleEndian"><PImageData WholeExtent="0 3 0 2 0 1"
+        Spacing="1 2 3" Direction="1 0 0 0 1 0 0 0 1"><Piece Extent="0 1 0 2 0 1" Source="a.pvti"/>
+        <Piece Source="../nowhere.vti"/></PImageData></VTKFile>"#;
+    vec![text.to_vec()]
+}
+
+pub(crate) fn structured_points() -> Vec<Vec<u8>> {
+    let header = |form: &str| {
+        format!(
+            "# vtk DataFile Version 5.1\ntitle\n{form}\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nSPACING 1 2 3\n\
+             ORIGIN 4 5 6\nPOINT_DATA 6\n"
+        )
+    };
+    let text = "SCALARS s short 1\nLOOKUP_TABLE default\n1 2 3 4 5 6\nFIELD f 2\nvtkGhostType 1 6 unsigned_char\n\
+                0 2 0 0 1 0\nMETADATA\nCOMPONENT_NAMES\n\nINFORMATION 0\n\nv 3 6 float\n\
+                1 2 3 4 5 6 7 8 9 1 2 3 4 5 6 7 8 9\nCELL_DATA 2\nSCALARS c double\nLOOKUP_TABLE default\n7 8\n";
+    let data = b"SCALARS s unsigned_char 1\nLOOKUP_TABLE default\n\x01\x02\x03\x04\x05\x06\n";
+    let binary = [header("BINARY").into_bytes(), data.to_vec()];
+    vec![header("ASCII").into_bytes().into_iter().chain(text.bytes()).collect(), binary.concat()]
+}
+
+/// Every kind of text, plane, tile and number.
+pub(crate) fn tiff_axes() -> Vec<Vec<u8>> {
+    use make_tiff::{Page, file, little, long, numbered, ratio, short, text};
+    let described = |count, description: &str| {
+        let mut pages = numbered(count);
+        pages[0] = pages[0].clone().with(&[text(270, description), ratio(282, 4, 1), short(296, &[3])]);
+        pages
+    };
+    let ome = "<OME><Image><Pixels DimensionOrder=\"XYZCT\" SizeZ=\"2\" SizeC=\"3\" PhysicalSizeX=\"0.5\" \
+               PhysicalSizeZ=\"2\"><TiffData IFD=\"0\" FirstZ=\"0\" PlaneCount=\"6\"/></Pixels></Image></OME>";
+    let mut tiled = Page { is_tiled: true, ..Page::gray(3, 2, 8, Vec::new()) };
+    tiled = tiled.with(&[short(322, &[2]), short(323, &[2]), long(32_997, &[3]), long(32_998, &[2])]);
+    tiled.chunks = vec![vec![5; 8]; 4];
+    let mut planar = Page::gray(2, 1, 16, Vec::new());
+    planar = planar.with(&[short(258, &[16; 3]), short(262, &[2]), short(277, &[3]), short(284, &[2])]);
+    planar.chunks = vec![vec![1, 2, 3, 4]; 3];
+    let jpeg = {
+        let mut file = Cursor::new(Vec::new());
+        let image = image::GrayImage::from_fn(8, 8, |x, y| image::Luma([(x * 31 + y * 17) as u8]));
+        image.write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
+        Page::gray(8, 8, 8, file.into_inner()).with(&[short(259, &[7])])
+    };
+    vec![
+        little(&described(6, "ImageJ=1\nimages=6\nchannels=3\nslices=2\nspacing=2\nunit=um\n")),
+        little(&described(6, ome)),
+        little(&described(6, "{\"shape\": [3, 2, 1, 2], \"axes\": \"TZYX\", \"spacing\": 2}")),
+        file(Big, false, &described(1, "ImageJ=1\nimages=3\nslices=3\n"), &[1, 2, 3, 4]),
+        file(Big, true, &[tiled], b""),
+        little(&[planar]),
+        little(&[Page::gray(9, 2, 1, vec![0xa5; 4]).with(&[short(262, &[0])]), Page::gray(1, 1, 8, vec![1])]),
+        little(&[jpeg]),
+    ]
+}
+
+pub(crate) fn nrrd_axes() -> Vec<Vec<u8>> {
+    let header = |fields: &str, data: &[u8]| [b"NRRD0005\n", fields.as_bytes(), b"\n\n", data].concat();
+    vec![
+        header(
+            "type: float\ndimension: 4\nsizes: 3 2 2 2\nspace: LPS\nspace directions: (1,0,0) (0,1,0) none (0,0,2)\n\
+             space origin: (1,2,3)\nkinds: domain domain list domain\nendian: big\nencoding: raw",
+            &[3; 96],
+        ),
+        header("type: int64\ndimension: 3\nsizes: 3 2 1\nendian: little\nencoding: raw\nspacings: 1 -2 nan", &[9; 48]),
+        header("type: short\ndimension: 2\nsizes: 3 2\nkinds: vector domain\nencoding: text", b"1 2 3 4 5 6"),
+        header("type: uint8\ndimension: 2\nsizes: 3 2\nencoding: hex\nline skip: 1", b"x\n01 02 03 04 05 06"),
+        b"NRRD0005\ntype: uint8\ndimension: 2\nsizes: 3 2\nencoding: raw\ndata file: LIST\naxes.nrrd\naxes.nrrd\n".to_vec(),
+        b"NRRD0005\ntype: uint8\ndimension: 2\nsizes: 3 2\nencoding: raw\ndata file: a%02d.raw 0 1 1\n".to_vec(),
+    ]
+}
+
 pub(crate) fn png() -> Vec<Vec<u8>> {
     use png::{BitDepth::*, ColorType::*};
     let mut files = Vec::new();
@@ -197,7 +287,9 @@ pub(crate) fn tiff() -> Vec<Vec<u8>> {
 }
 
 pub(crate) fn mesh_obj() -> Vec<Vec<u8>> {
-    vec![make_mesh::OBJ.as_bytes().to_vec()]
+    let strange =
+        "\u{feff}V 0 0 0 # \\\nv 1 0 \\\r\n0\rv 0 1 0 #c\nusemtl a\\\nF 1 2 3 # x\ncurv 0 1 \\\n2 3\n";
+    vec![make_mesh::OBJ.as_bytes().to_vec(), strange.as_bytes().to_vec()]
 }
 
 pub(crate) fn mesh_gltf() -> Vec<Vec<u8>> {

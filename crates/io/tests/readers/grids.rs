@@ -421,7 +421,10 @@ fn exodus_blocks_and_values_at_the_first_step() {
     assert_eq!((values(&on_cells)[1], on_cells.grid.is_blank(1)), (7.0, true));
 
     let line = refuse(&folder.put("a.ex2", b"\x89HDF\r\n\x1a\n"), &of("p"));
-    assert_eq!(line, "format is netCDF-4 (HDF5), expected Exodus II in netCDF-3 (classic)");
+    assert_eq!(
+        line,
+        "format is netCDF-4 (HDF5), expected Exodus II in netCDF-3 (classic), as 'nccopy -k cdf5' makes it"
+    );
     assert!(refuse(&folder.put("a.ex2", "hello"), &of("p")).starts_with("the netCDF header is damaged"));
     let whole = exodus().file();
     for cut in 1..whole.len() - 8 {

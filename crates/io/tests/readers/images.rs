@@ -81,22 +81,17 @@ fn png_of_every_colour_type() {
         (Grayscale, One, vec![0b0100_0000, 0b1000_0000], SampleType::U8, vec![0.0, 255.0, 255.0, 0.0], 0),
         (Rgb, Eight, (0..12).collect(), SampleType::Rgb8, (0..12).map(f64::from).collect(), 0),
         (Rgba, Eight, (0..16).collect(), SampleType::Rgba8, (0..16).map(f64::from).collect(), 0),
+        (GrayscaleAlpha, Eight, vec![9, 1, 8, 2, 7, 3, 6, 4], SampleType::U8, vec![9.0, 8.0, 7.0, 6.0], 1),
+        (Indexed, Eight, vec![0, 1, 1, 0], SampleType::U8, vec![0.0, 1.0, 1.0, 0.0], 1),
         (
             GrayscaleAlpha,
-            Eight,
-            vec![9, 1, 8, 2, 7, 3, 6, 4],
-            SampleType::Rgba8,
-            [9, 9, 9, 1, 8, 8, 8, 2, 7, 7, 7, 3, 6, 6, 6, 4].map(f64::from).to_vec(),
-            0,
+            Sixteen,
+            vec![1, 2, 9, 9, 3, 4, 9, 9, 0, 0, 9, 9, 0, 1, 9, 9],
+            SampleType::U16,
+            vec![258.0, 772.0, 0.0, 1.0],
+            1,
         ),
-        (
-            Indexed,
-            Eight,
-            vec![0, 1, 1, 0],
-            SampleType::Rgba8,
-            [1, 2, 3, 255, 250, 251, 252, 7, 250, 251, 252, 7, 1, 2, 3, 255].map(f64::from).to_vec(),
-            0,
-        ),
+        (Indexed, One, vec![0b0100_0000, 0b1000_0000], SampleType::U8, vec![0.0, 1.0, 1.0, 0.0], 1),
         (Rgb, Sixteen, (0..24).collect(), SampleType::Rgb8, (0..12).map(|i| f64::from(2 * i)).collect(), 1),
     ];
     for (color, depth, data, sample, expected, notes) in cases {
@@ -210,8 +205,9 @@ fn tiff_pages_are_a_stack_of_any_type() {
             &[1.0, 2.0, 3.0, 4.0],
         );
     }
-    let line = folder.refuse("a.tif", tiff::<colortype::RGB16>(1, 1, &[vec![1, 2, 3]], false));
-    assert!(line.starts_with("colour type is RGB(16), expected gray of 8"), "{line}");
+    let volume = folder.read("a.tif", tiff::<colortype::RGB16>(1, 1, &[vec![256, 513, 65_535]], false));
+    assert_values(&volume, &[1.0, 2.0, 255.0]);
+    assert_eq!(volume.notes, ["the colours have 16 bits a channel; their upper 8 are used"]);
 }
 
 /// A big-endian TIFF of one strip, by hand: tag, type (3 short, 4 long), value.
@@ -252,7 +248,8 @@ fn tiff_of_big_endian_and_with_sizes_that_lie() {
     assert_values(&volume, &[1.0, 256.0, 65534.0]);
     for (width, height) in [(u32::MAX, u32::MAX), (0, 1), (3, 0), (60_000, 60_000)] {
         let line = folder.refuse("a.tif", big_endian_tiff(&sixteen_bits(width, height, 6), &data));
-        assert!(line.starts_with("image size is") || line.starts_with("the TIFF file is damaged"), "{line}");
+        let expected = ["image size is", "the data of a page holds", "ImageWidth is", "ImageLength is"];
+        assert!(expected.iter().any(|expected| line.starts_with(expected)), "{line}");
     }
     folder.refuse("a.tif", big_endian_tiff(&sixteen_bits(3, 2, 6), &data));
     folder.refuse("a.tif", big_endian_tiff(&sixteen_bits(3, 1, u32::MAX), &data));

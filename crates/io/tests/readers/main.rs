@@ -2,14 +2,19 @@
 //! truncated, lying and hostile ones.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod axes;
+mod foreign;
+mod ghosts;
 mod grids;
 mod images;
 mod make;
 mod make_grid;
 mod make_mesh;
 mod make_stack;
+mod make_tiff;
 mod meshes;
 mod nifti;
+mod orientation;
 mod outputs;
 mod raw;
 mod regressions;
@@ -17,6 +22,7 @@ mod scene;
 mod series;
 mod stack;
 mod text;
+mod tiff;
 mod transfer;
 mod transfer_json;
 mod vti;

@@ -128,6 +128,49 @@ fn sparse_positions_are_changed_ones() {
     assert!((x - (10.0 - 16.0)).abs() < 1e-5 && (y - 14.0).abs() < 1e-5 && z == 18.0, "{x} {y} {z}");
 }
 
+/// A triangle and a square beside it.
+const PLAIN_OBJ: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 1\nf 1 2 3 4\nf 2 5 3\n";
+
+#[test]
+fn obj_lines_are_joined_only_where_a_statement_goes_on() {
+    let folder = Folder::new();
+    let expected = corners(&read(&folder, "a.obj", PLAIN_OBJ));
+    assert_eq!(expected.len(), 3);
+    for (from, to) in [
+        ("v 1 0 0\n", "v 1 \\\n0 \\\r\n 0\n"),
+        ("f 1 2 3 4\n", "f 1 2 \\\n3 4\n"),
+        // What follows none of these is part of them.
+        ("v 1 0 0\n", "# a path C:\\\nv 1 0 0\n"),
+        ("v 1 0 0\n", "usemtl C:\\\nv 1 0 0\n"),
+        ("v 1 0 0\n", "g a\\\nv 1 0 0\n"),
+        ("f 1 2 3 4\n", "mtllib x\\\nf 1 2 3 4\n"),
+        ("v 0 0 0\n", "#\\\nv 0 0 0\n"),
+    ] {
+        assert!(PLAIN_OBJ.contains(from), "{from}");
+        let mesh = read(&folder, "a.obj", PLAIN_OBJ.replacen(from, to, 1));
+        assert_eq!(corners(&mesh), expected, "{to}");
+    }
+}
+
+#[test]
+fn obj_comments_capitals_and_line_ends_do_no_harm() {
+    let folder = Folder::new();
+    let expected = corners(&read(&folder, "a.obj", PLAIN_OBJ));
+    let cases: [Vec<u8>; 8] = [
+        PLAIN_OBJ.replace("f 1 2 3 4", "f 1 2 3 4 # bottom").into(),
+        PLAIN_OBJ.replace("f 1 2 3 4", "f 1 2 3 4 #bottom \\").into(),
+        PLAIN_OBJ.replace("v 1 1 0", "v 1 1 0 #corner").into(),
+        PLAIN_OBJ.replace('\n', "\r").into(),
+        PLAIN_OBJ.replace('\n', "\r\n").into(),
+        PLAIN_OBJ.to_ascii_uppercase().into(),
+        [b"\xef\xbb\xbf", PLAIN_OBJ.as_bytes()].concat(),
+        PLAIN_OBJ.replace(' ', "\t ").replace("f\t", "  f\t").into(),
+    ];
+    for case in cases {
+        assert_eq!(corners(&read(&folder, "a.obj", &case)), expected, "{}", String::from_utf8_lossy(&case));
+    }
+}
+
 #[test]
 fn what_an_obj_file_cannot_be() {
     let folder = Folder::new();

@@ -100,3 +100,40 @@ fn what_is_no_series_is_refused_in_one_line() {
         assert!(line.contains(words) && line.starts_with(&path.display().to_string()), "{line}");
     }
 }
+
+#[test]
+fn repeated_steps_other_separators_and_surfaces_do_no_harm() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("sub")).unwrap();
+    folder.put("sub/a.vtu", vtu_of("7"));
+    folder.put("wall.vtp", "<VTKFile type=\"PolyData\"><PolyData/></VTKFile>");
+    folder.put(
+        "p.pvtu",
+        "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece Source=\"sub/a.vtu\"/></PUnstructuredGrid></VTKFile>",
+    );
+    let cells = |entries: &[&str]| {
+        let file = read_grid(&folder.put("a.pvd", collection(entries)), &GridOptions::default());
+        let file = file.unwrap_or_else(|error| panic!("{error}"));
+        (file.grid.cells().len(), file.notes)
+    };
+    let (once, _) = cells(&["timestep=\"1\" file=\"sub/a.vtu\""]);
+    let same = ["timestep=\"1\" part=\"0\" file=\"sub/a.vtu\""; 2];
+    assert_eq!(cells(&same).0, once);
+    assert_eq!(cells(&["timestep=\"1\" file=\"sub\\a.vtu\""]).0, once);
+    let (found, notes) = cells(&[same[0], "timestep=\"1\" part=\"1\" file=\"wall.vtp\""]);
+    assert_eq!(found, once);
+    assert!(
+        notes.iter().any(|note| note.ends_with("wall.vtp has no cells of volume, and is left out")),
+        "{notes:?}"
+    );
+    assert_eq!(cells(&[same[0], "timestep=\"1\" part=\"1\" file=\"p.pvtu\""]).0, 2 * once);
+    // A step that is asked for, and one that is not there.
+    folder.put("b.vtu", vtu_of("9"));
+    let path = folder.put("a.pvd", collection(&[same[0], "timestep=\"2\" file=\"b.vtu\""]));
+    let options = |step| GridOptions { time_step: Some(step), ..GridOptions::default() };
+    assert_eq!(read_grid(&path, &options(1)).unwrap().grid.arrays()[0].values.value(1, 0), 9.0);
+    let line = read_grid(&path, &options(2)).unwrap_err().to_string();
+    assert!(line.ends_with("time step asked for is 2, expected 0 to 1"), "{line}");
+    let line = read_grid(&folder.path("b.vtu"), &options(1)).unwrap_err().to_string();
+    assert!(line.ends_with("time step asked for is 1, expected 0: the file holds one"), "{line}");
+}

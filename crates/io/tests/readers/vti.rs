@@ -81,8 +81,9 @@ fn the_array_is_the_one_asked_for_else_active_else_first_that_can_be_read() {
     let options = |name: &str| ReadOptions { array: Some(name.to_owned()), ..ReadOptions::default() };
     let line = refuse(&path, &options("q"));
     assert_eq!(line, "array is 'q', expected one of 'velocity, a, b&c, x'");
-    let line = refuse(&path, &options("velocity"));
-    assert_eq!(line, "NumberOfComponents is 3 of Float32, expected 1, or 3 or 4 of UInt8");
+    let velocity = read("velocity");
+    assert_values(&velocity, &[14.0, 77.0].map(|squares: f64| f64::from(squares.sqrt() as f32)));
+    assert!(velocity.notes[0].contains("3 components; their magnitude is used"), "{:?}", velocity.notes);
 }
 
 /// What to replace by what in [`SEVERAL`], and how the refusal begins.
@@ -131,7 +132,11 @@ const LIES: &[(&str, &str, &str)] = &[
         "Piece Extent=\"0 60000000000 0 0 0 0\"",
         "count of numbers in the array is 2, expected 60000000001",
     ),
-    ("</Piece>", "</Piece><Piece Extent=\"1 2 0 0 0 0\"></Piece>", "number of pieces is 2, expected 1"),
+    (
+        "</Piece>",
+        "</Piece><Piece Extent=\"1 2 0 0 0 0\"></Piece>",
+        "array 'b&c' is missing, expected one as in",
+    ),
     ("Spacing=\"1 1 1\"", "Spacing=\"nan 1 1\"", "Spacing of axis 0 is NaN"),
     ("Spacing=\"1 1 1\"", "Spacing=\"1 1\"", "Spacing is '1 1', expected 3 numbers"),
     ("Spacing=\"1 1 1\"", "Spacing=\"0 1 1\"", "Spacing of axis 0 is 0"),

@@ -55,6 +55,9 @@ pub struct ArrayInfo {
     pub range: Option<[f64; 2]>,
     /// Values that are NaN or infinite.
     pub blank: u64,
+    /// Why its values cannot be read, if they cannot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
 }
 
 /// One kind of defect on cells of one type.
@@ -122,9 +125,9 @@ fn defects(grid: &volery_scene::UnstructuredGrid) -> Vec<DefectInfo> {
 }
 
 impl From<ArrayRange> for ArrayInfo {
-    fn from(ArrayRange { array, range, blank }: ArrayRange) -> Self {
+    fn from(ArrayRange { array, range, blank, problem }: ArrayRange) -> Self {
         let GridArray { name, place, components, scalar } = array;
-        Self { name, place: place.to_string(), components, scalar, range, blank }
+        Self { name, place: place.to_string(), components, scalar, range, blank, problem }
     }
 }
 
@@ -149,12 +152,13 @@ impl fmt::Display for GridInfo {
                 write!(f, "{} x ", array.components)?;
             }
             write!(f, "{}", array.scalar)?;
-            match array.range {
-                Some([low, high]) => {
+            match (array.range, &array.problem) {
+                (_, Some(problem)) => write!(f, ", cannot be read: {problem}")?,
+                (Some([low, high]), None) => {
                     let what = if array.components > 1 { ", magnitude " } else { ", " };
                     write!(f, "{what}{} to {}", number(low), number(high))?;
                 }
-                None => write!(f, ", no finite value")?,
+                (None, None) => write!(f, ", no finite value")?,
             }
             if array.blank > 0 {
                 write!(f, ", {} blank", array.blank)?;

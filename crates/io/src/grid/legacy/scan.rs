@@ -42,15 +42,15 @@ impl BlockType {
 
 /// Numbers somewhere in the file.
 #[derive(Clone, Copy)]
-pub(super) struct Block<'a> {
+pub(crate) struct Block<'a> {
     bytes: &'a [u8],
     is_binary: bool,
-    pub(super) scalar: Scalar,
+    pub(crate) scalar: Scalar,
     pub(super) count: usize,
 }
 
 impl<'a> Block<'a> {
-    pub(super) fn numbers(&self) -> Result<Numbers<'a>, Problem> {
+    pub(crate) fn numbers(&self) -> Result<Numbers<'a>, Problem> {
         if self.is_binary {
             return Ok(Numbers::Bytes(Box::new(self.bytes), ByteOrder::Big));
         }
@@ -64,11 +64,13 @@ pub(super) struct Scanner<'a> {
     bytes: &'a [u8],
     position: usize,
     pub(super) is_binary: bool,
+    /// Components of the last array: so many names `METADATA` has for them.
+    components: usize,
 }
 
 impl<'a> Scanner<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, position: 0, is_binary: false }
+        Self { bytes, position: 0, is_binary: false, components: 0 }
     }
 
     fn rest(&self) -> &'a [u8] {
@@ -83,10 +85,22 @@ impl<'a> Scanner<'a> {
         rest[..length].trim_ascii()
     }
 
-    /// Passes the lines after `METADATA`, up to a blank one.
+    /// Passes the lines after `METADATA`, up to a blank one. Names of components may be blank, too.
     pub(super) fn skip_metadata(&mut self) {
         self.line();
-        while !self.line().is_empty() {}
+        loop {
+            match self.line() {
+                b"" => return,
+                b"COMPONENT_NAMES" => (0..self.components).for_each(|_| _ = self.line()),
+                _ => {}
+            }
+        }
+    }
+
+    /// The next word as a real number.
+    pub(super) fn number(&mut self, what: &str) -> Result<f64, Problem> {
+        let word = self.expect(what)?;
+        word.parse().map_err(|_| Problem::field(what, quoted(word), "a number"))
     }
 
     /// The next word, or `None` at the end of the file.
@@ -129,6 +143,7 @@ impl<'a> Scanner<'a> {
         components: usize,
     ) -> Result<Option<Block<'a>>, Problem> {
         let too_many = || Problem::field("count of numbers", tuples, "one that can be addressed");
+        self.components = components;
         let count = tuples.checked_mul(components).ok_or_else(too_many)?;
         if self.is_binary || block_type == BlockType::Text {
             self.line();
