@@ -20,7 +20,7 @@ mod json;
 
 pub use color::ColorSpace;
 pub use color_map::{ColorMap, MAX_COLOR_ERROR, OpacityPoint};
-pub(crate) use json::TransferJson;
+pub(crate) use json::{Transfer2dJson, TransferJson};
 pub use json::{Transfer2dProblem, read_transfer_2d, write_transfer, write_transfer_2d};
 
 /// Transfer function files larger than this are refused.
