@@ -15,8 +15,10 @@ use volery::{
 use volery_frame::{
     Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, UploadError, VolumeLayout,
 };
+use volery_io::SceneFile;
+use volery_io::scene_file::SceneTransfer;
 use volery_reference::metrics::{Comparison, compare};
-use volery_scene::VoxelGrid;
+use volery_scene::{TransferFunction, VoxelGrid};
 
 /// The folder of real data: `VOLERY_DATA`, or `../shared/data` from the root of the workspace. `None` means that
 /// the test is ignored, and has been printed.
@@ -55,20 +57,32 @@ pub fn read_scene(data: &Path, name: &str) -> Input {
 /// What a scene file says to draw, at full resolution.
 ///
 /// # Panics
-/// When the input came without a scene file.
+/// When the input came without a scene file, or one that leaves something open.
 pub fn view_of(input: &Input) -> View {
     let scene = input.scene.as_ref().expect("read from a scene file");
+    let [width, height] = scene.size.expect("a scene with a size");
     View {
-        width: scene.size[0],
-        height: scene.size[1],
-        camera: scene.camera,
-        transfer: scene.transfer.clone(),
-        background: scene.background,
+        width,
+        height,
+        camera: scene.camera.expect("a scene with a camera"),
+        transfer: transfer_of(scene).clone(),
+        background: scene.background.expect("a scene with a background"),
         tolerance: None,
         planes: PlaneView::default(),
         thickness: Thickness::default(),
         stack: StackView::default(),
         meshes: input.meshes.clone(),
+    }
+}
+
+/// The transfer function of a scene that has one over values.
+///
+/// # Panics
+/// When it has none, or another.
+pub fn transfer_of(scene: &SceneFile) -> &TransferFunction {
+    match &scene.transfer {
+        Some(SceneTransfer::Values(transfer)) => transfer,
+        other => panic!("expected a transfer function over values, found {other:?}"),
     }
 }
 

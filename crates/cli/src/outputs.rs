@@ -30,9 +30,9 @@ struct Folder {
 }
 
 impl Outputs {
-    /// Adds a file that an option names, if it names one.
-    pub(crate) fn file(mut self, option: &'static str, path: Option<&Path>) -> Self {
-        self.files.extend(path.map(|path| (option, path.to_owned())));
+    /// Adds a file that an option names.
+    pub(crate) fn file(mut self, option: &'static str, path: &Path) -> Self {
+        self.files.push((option, path.to_owned()));
         self
     }
 
@@ -40,11 +40,10 @@ impl Outputs {
     pub(crate) fn folder(
         mut self,
         option: &'static str,
-        path: Option<&Path>,
+        path: &Path,
         is_written: fn(&OsStr) -> bool,
     ) -> Self {
-        let folder = |path: &Path| Folder { option, path: path.to_owned(), is_written };
-        self.folders.extend(path.map(folder));
+        self.folders.push(Folder { option, path: path.to_owned(), is_written });
         self
     }
 
@@ -63,17 +62,24 @@ impl Outputs {
     /// Refuses outputs that are inputs; for those that are known late.
     pub(crate) fn check_inputs<'a>(&self, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
         let written = self.places();
+        let refuse = |clash: &Written, what: &str, path: &Path| {
+            let (option, output, input) = (clash.option, clash.path.display(), path.display());
+            Err(Failure::usage(format!("{option} {output}: is {what} {input}, expected another file")))
+        };
         for input in inputs {
             let inside = files_in(input, &|_| true);
-            // A folder of slices is changed by one slice more.
-            let folder = inside.is_empty().then_some(input.to_owned());
-            for path in inside.into_iter().chain(folder) {
-                let Some(place) = Place::of(&path) else { continue };
-                if let Some(clash) = written.iter().find(|written| written.holds(&place)) {
-                    let (option, output, input) = (clash.option, clash.path.display(), path.display());
-                    let problem = format!("{option} {output}: is the input {input}, expected another file");
-                    return Err(Failure::usage(problem));
+            for path in inside.iter().map(PathBuf::as_path).chain([input]) {
+                let place = Place::of(path);
+                let clash = written.iter().find(|written| place.as_ref().is_some_and(|place| written.holds(place)));
+                if let Some(clash) = clash {
+                    return refuse(clash, "the input", path);
                 }
+            }
+            // A folder of slices would have one slice more.
+            let folder = Folder { option: "", path: input.to_owned(), is_written: is_slice };
+            let folder = Written::in_folder(&folder);
+            if let Some(clash) = written.iter().find(|written| written.is_in(&folder)) {
+                return refuse(clash, "a new slice in the input", input);
             }
         }
         Ok(())
@@ -116,12 +122,16 @@ impl Outputs {
                 Written { option: folder.option, path, place, folder: None }
             };
             written.extend(files_in(&folder.path, &|name| (folder.is_written)(name)).into_iter().map(place));
-            let real = fs::canonicalize(&folder.path).ok();
-            let new = real.map(|real| (real, folder.is_written));
-            written.push(Written { option: folder.option, path: folder.path.clone(), place: None, folder: new });
+            written.push(Written::in_folder(folder));
         }
         written
     }
+}
+
+/// Whether a file of this name in a folder of slices is one of them.
+fn is_slice(name: &OsStr) -> bool {
+    let ending = Path::new(name).extension();
+    ending.is_some_and(|ending| ["png", "tif", "tiff"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
 /// A place that may be written, and who asks for it.
@@ -135,6 +145,13 @@ struct Written {
 }
 
 impl Written {
+    /// The new files of a folder.
+    fn in_folder(folder: &Folder) -> Self {
+        let real = fs::canonicalize(&folder.path).ok().filter(|path| path.is_dir());
+        let new = real.map(|real| (real, folder.is_written));
+        Self { option: folder.option, path: folder.path.clone(), place: None, folder: new }
+    }
+
     fn holds(&self, place: &Place) -> bool {
         self.place.as_ref() == Some(place)
     }
@@ -201,13 +218,10 @@ fn check_folder(folder: &Path) -> Result<(), Failure> {
     let there = folder.ancestors().find(|path| path.as_os_str().is_empty() || path.exists());
     let there = there.filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !there.is_dir() {
-        let (folder, there) = (folder.display(), there.display());
-        return Err(Failure::undone(format!("{folder}: cannot be made: {there} is a file, expected a folder")));
+        let problem = format!("cannot be made: {} is a file, expected a folder", there.display());
+        return Err(Failure::of_file(folder, problem));
     }
-    check_writable(&there.join(".volery")).map_err(|error| Failure::undone(error.source.to_string())).map_err(
-        |Failure { message, status }| {
-            let message = format!("{}: nothing can be written there: {message}", folder.display());
-            Failure { message, status }
-        },
-    )
+    check_writable(&there.join(".volery")).map_err(|error| {
+        Failure::of_file(folder, format_args!("nothing can be written there: {}", error.source))
+    })
 }

@@ -1,7 +1,6 @@
 //! What a picture shall be: the scene, and over it what the command line says.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
 
 use volery::fit::{self, Direction};
 use volery::glam::DVec3;
@@ -10,9 +9,9 @@ use volery::io::scene_file::{
     SceneTransfer,
 };
 use volery::io::transfer::{TransferError, TransferOptions, TransferProblem};
-use volery::io::{read_transfer, read_transfer_2d};
+use volery::io::{one_of, read_transfer, read_transfer_2d};
 use volery::{
-    Focus, Input, Plane, PlaneView, Preset, Sampling, Slicing, StackView, Thickness, View, ViewOptions,
+    Focus, Input, InputData, Plane, PlaneView, Preset, Sampling, Slicing, StackView, Thickness, View, ViewOptions,
 };
 
 use crate::Failure;
@@ -114,7 +113,7 @@ pub(crate) fn over(args: &RenderArgs, scene: Option<&SceneFile>, input: SceneInp
         transparent: planes.transparent || scene.transparent,
         nearest: planes.nearest || scene.nearest,
         show_nodes: planes.show_nodes || scene.show_nodes,
-        thickness: args.thickness.map(|name| Thickness::from(name).into_scene()).or(scene.thickness),
+        thickness: args.thickness.map(SceneThickness::from).or(scene.thickness),
         slices: stack.slices.or(scene.slices),
         adaptive: stack.adaptive.or(scene.adaptive),
         axes: stack.axes || scene.axes,
@@ -143,20 +142,6 @@ fn scene_backend(backend: BackendName) -> Option<SceneBackend> {
     }
 }
 
-/// The words of scenes for how lengths in cubes are found.
-trait IntoScene {
-    fn into_scene(self) -> SceneThickness;
-}
-
-impl IntoScene for Thickness {
-    fn into_scene(self) -> SceneThickness {
-        match self {
-            Self::Exact => SceneThickness::Exact,
-            Self::Interpolated => SceneThickness::Interpolated,
-        }
-    }
-}
-
 /// The view that is wanted of a session's data.
 pub(crate) fn view(
     args: &RenderArgs,
@@ -164,6 +149,7 @@ pub(crate) fn view(
     input: &Input,
     session: &dyn Drawn,
 ) -> Result<View, Failure> {
+    check_applies(args, wanted, input, session)?;
     let mut stack = stack_view(wanted);
     let transfer = match load_transfer(args, wanted, session)? {
         None => None,
@@ -203,15 +189,52 @@ pub(crate) fn view(
     Ok(view)
 }
 
+/// Refuses options that the data, or the transfer function, have no use for.
+fn check_applies(
+    args: &RenderArgs,
+    wanted: &SceneFile,
+    input: &Input,
+    session: &dyn Drawn,
+) -> Result<(), Failure> {
+    let own_colors = |option: &str, expected: &str| {
+        let problem = format!("samples are colours of their own, expected {expected} for {option}");
+        Err(Failure::of_file(&input.path, problem))
+    };
+    if session.has_colors() {
+        let number = "one channel of numbers";
+        if args.transfer.is_some() {
+            return own_colors("--transfer", number);
+        }
+        if args.range.is_some() {
+            return own_colors("--range", number);
+        }
+        let is_opaque = matches!(&input.data, InputData::Volume(volume)
+            if volume.grid.sample_type().channels() == 3);
+        if wanted.transparent && is_opaque {
+            return own_colors("--transparent", "samples with an opacity");
+        }
+    }
+    let fixed = match (&args.transfer, &wanted.transfer) {
+        (Some(Transfer::File(_)), _) | (_, None) => None,
+        (_, Some(SceneTransfer::Preset(name))) => {
+            Preset::from_name(name).filter(|preset| !preset.is_automatic()).map(|_| name.clone())
+        }
+        (_, Some(_)) => Some("transfer_function of the scene".to_owned()),
+    };
+    match fixed.filter(|_| wanted.range.is_some()) {
+        Some(name) => Err(has_own_values(&name)),
+        None => Ok(()),
+    }
+}
+
+fn has_own_values(name: &str) -> Failure {
+    Failure::undone(format!("{name} has values of its own, expected automatic colours or a colour map for --range"))
+}
+
 fn unknown_preset(name: &str) -> Failure {
     let names: Vec<_> = Preset::all().map(Preset::name).collect();
-    let near = crate::near::nearest(name, &names).map(|near| format!("; did you mean {near}?"));
-    Failure::undone(format!(
-        "transfer function '{}' is unknown, expected one of {}{}",
-        name.escape_debug(),
-        names.join(", "),
-        near.unwrap_or_default()
-    ))
+    let (name, known) = (name.escape_debug(), one_of(name, &names));
+    Failure::undone(format!("transfer function '{name}' is unknown, expected one of {known}"))
 }
 
 fn plane_view(wanted: &SceneFile) -> PlaneView {
@@ -252,9 +275,15 @@ fn load_transfer(
         unit_distance: volery::transfer::unit_distance(session.extent()),
     };
     match read_transfer(path, &options) {
+        Ok(named) if !named.is_stretched && wanted.range.is_some() => {
+            Err(has_own_values(&path.display().to_string()))
+        }
         Ok(named) => Ok(Some(SceneTransfer::Values(named.transfer))),
         Err(TransferError { problem: TransferProblem::HasMagnitudes, .. }) if session.knows_gradients() => {
             Ok(Some(SceneTransfer::Magnitudes(read_transfer_2d(path)?)))
+        }
+        Err(error @ TransferError { problem: TransferProblem::Choice { .. }, .. }) => {
+            Err(Failure::undone(format!("{error} for --color-map")))
         }
         Err(error) => Err(error.into()),
     }

@@ -31,6 +31,7 @@ mod error;
 pub mod grid;
 mod layout;
 pub mod mesh;
+mod near;
 mod numbers;
 mod out;
 pub mod scene_file;
@@ -44,6 +45,7 @@ pub use error::{Problem, ReadError};
 pub use grid::{GridFile, GridOptions, is_grid, read_grid};
 pub use layout::{ByteOrder, Element, ParseElementError};
 pub use mesh::{MeshFile, read_mesh};
+pub use near::{nearest, one_of};
 pub use out::{
     Abandoned, Picture, WriteError, abandon_unfinished, check_writable, read_png_rgb, write_atomically, write_exr,
     write_nrrd, write_png,

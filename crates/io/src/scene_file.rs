@@ -29,6 +29,7 @@ mod check;
 mod transfer;
 
 pub use camera::serialize_camera;
+pub use transfer::serialize as serialize_transfer;
 pub use check::{MAX_PIXELS, MAX_SIDE, SizeError, check_size};
 
 /// Scene files larger than this are refused.

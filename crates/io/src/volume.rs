@@ -177,7 +177,7 @@ fn format_of(path: &Path, options: &ReadOptions) -> Result<Format, Problem> {
     Err(Problem::field(
         "file name",
         quoted(&name),
-        "one that ends in .raw, .nii, .nrrd, .nhdr, .mha, .mhd, .vti, .tif, .png or .jpg, or dims and dtype",
+        "one that ends in .raw, .nii, .nrrd, .nhdr, .mha, .mhd, .vti, .tif, .png or .jpg, or dims and dtype (--dims, --dtype)",
     ))
 }
 

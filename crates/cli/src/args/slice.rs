@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use volery::glam::DVec3;
 
-use super::{numbers, with_ending};
+use super::{has_ending, numbers, with_ending};
 
 /// `volery slice`
 #[derive(Debug, Args)]
@@ -37,6 +37,15 @@ pub(crate) struct SliceArgs {
     /// Compress the .glb by EXT_meshopt_compression
     #[arg(long)]
     pub(crate) meshopt: bool,
+}
+
+impl SliceArgs {
+    /// An option that the output would not read.
+    pub(super) fn conflict(&self) -> Option<String> {
+        let unread = self.meshopt && !has_ending(&self.output, &["glb"]);
+        let output = self.output.display();
+        unread.then(|| format!("--meshopt compresses .glb files, expected -o OUT.glb in place of {output}"))
+    }
 }
 
 fn parse_axis(text: &str) -> Result<DVec3, String> {

@@ -7,7 +7,11 @@ use serde_json::Value;
 use super::SceneTransfer;
 use crate::transfer::{Transfer2dJson, TransferJson};
 
-pub(super) fn serialize<S: Serializer>(
+/// Serialises a transfer function as scene files have it.
+///
+/// # Errors
+/// Those of the serialiser.
+pub fn serialize<S: Serializer>(
     transfer: &Option<SceneTransfer>,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {

@@ -49,7 +49,8 @@ fn from_name(name: &str) -> Result<([u64; 3], Element), Problem> {
     let element = words.next().and_then(|word| word.parse().ok());
     let dims = words.next().and_then(parse_dims);
     dims.zip(element).ok_or_else(|| {
-        Problem::field("file name", quoted(name), "one such as name_256x256x128_uint8.raw, or dims and dtype")
+        let expected = "one such as name_256x256x128_uint8.raw, or dims and dtype (--dims, --dtype)";
+        Problem::field("file name", quoted(name), expected)
     })
 }
 
