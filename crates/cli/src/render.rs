@@ -14,7 +14,6 @@ mod empty;
 mod files;
 mod grid;
 
-pub(crate) use files::summary;
 use files::Done;
 
 use crate::args::{RenderArgs, Transfer, numbered};

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use volery::fit::{self, Direction};
+use volery::fit;
 use volery::glam::DVec3;
 use volery::io::scene_file::{
     SceneBackend, SceneFile, SceneFocus, SceneInput, ScenePlane, SceneTechnique, SceneThickness,

@@ -18,7 +18,8 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         if path.is_dir() {
             found.extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
         } else {
-            found.insert(name, std::fs::read(&path).unwrap());
+            // A link to nowhere has no content.
+            found.insert(name, std::fs::read(&path).unwrap_or_default());
         }
     }
     found
@@ -62,21 +63,21 @@ fn workshop() -> Workshop {
     shop
 }
 
-/// A run, its inputs, and whether it measures errors.
-const RUNS: [(&str, &[&str], bool); 6] = [
-    ("render v_4x4x4_uint8.raw --size 8x8", &["v_4x4x4_uint8.raw"], true),
-    ("render waves.nrrd --transfer t.json --size 8x8", &["waves.nrrd", "t.json"], true),
-    ("render s.json --size 8x8", &["s.json", "waves.nrrd", "hull.obj"], true),
-    ("render h.nhdr --size 8x8", &["h.nhdr", "data.bin"], true),
-    ("render ring.vtk --size 8x8", &["ring.vtk"], true),
-    ("render slices --size 8x8", &["slices/00.png", "slices/01.png"], true),
+/// A run and its inputs.
+const RUNS: [(&str, &[&str]); 6] = [
+    ("render v_4x4x4_uint8.raw --size 8x8", &["v_4x4x4_uint8.raw"]),
+    ("render waves.nrrd --transfer t.json --size 8x8", &["waves.nrrd", "t.json"]),
+    ("render s.json --size 8x8", &["s.json", "waves.nrrd", "hull.obj"]),
+    ("render h.nhdr --size 8x8", &["h.nhdr", "data.bin"]),
+    ("render ring.vtk --size 8x8", &["ring.vtk"]),
+    ("render slices --size 8x8", &["slices/00.png", "slices/01.png"]),
 ];
 
 #[test]
 fn no_output_of_a_picture_is_an_input_by_any_name() {
     let shop = workshop();
     let mut num_tried = 0;
-    for (line, inputs, _) in RUNS {
+    for (line, inputs) in RUNS {
         for input in inputs {
             let full = shop.path(input);
             for (option, ending) in
