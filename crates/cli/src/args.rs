@@ -187,7 +187,9 @@ fn data_without_scene(data: Option<&PathBuf>, input: &Path) -> Option<String> {
     let unread = data.is_some() && !has_ending(input, &["json"]);
     unread.then(|| {
         let input = input.display();
-        format!("--data is for the paths in a scene file, {input} is none: expected a name that ends in .json")
+        format!(
+            "--data is for the paths in a scene file, {input} is none: expected a name that ends in .json"
+        )
     })
 }
 

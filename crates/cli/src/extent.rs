@@ -34,8 +34,10 @@ pub(crate) fn check(
     let most = size / (LEAST_STEPS * step);
     if size > 0.0 && most < num_slices as f64 {
         let most = number(most.floor());
-        let problem =
-            format!("{}, where 64-bit numbers can tell {most} slices apart, expected fewer than {num_slices}", place());
+        let problem = format!(
+            "{}, where 64-bit numbers can tell {most} slices apart, expected fewer than {num_slices}",
+            place()
+        );
         return Err(Failure::of_file(path, problem));
     }
     let along = |normal: DVec3| {

@@ -135,7 +135,9 @@ fn complain(message: &str) {
 fn say(text: impl Display) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::undone(format!("stdout: {error}"))),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::undone(format!("stdout: {error}")))
+        }
         _ => Ok(()),
     }
 }

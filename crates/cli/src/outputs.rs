@@ -70,7 +70,8 @@ impl Outputs {
             let inside = files_in(input, &|_| true);
             for path in inside.iter().map(PathBuf::as_path).chain([input]) {
                 let place = Place::of(path);
-                let clash = written.iter().find(|written| place.as_ref().is_some_and(|place| written.holds(place)));
+                let clash =
+                    written.iter().find(|written| place.as_ref().is_some_and(|place| written.holds(place)));
                 if let Some(clash) = clash {
                     return refuse(clash, "the input", path);
                 }

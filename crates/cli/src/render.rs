@@ -6,8 +6,8 @@ use std::path::Path;
 use volery::io::scene_file::{SceneBackend, SceneFile, SceneTechnique};
 use volery::output::write_image;
 use volery::{
-    Backend, BackendChoice, Input, InputData, InputOptions, Picture, RenderError, Session, Step, View, VoxelGrid,
-    open_backend,
+    Backend, BackendChoice, Input, InputData, InputOptions, Picture, RenderError, Session, Step, View,
+    VoxelGrid, open_backend,
 };
 
 mod empty;
@@ -130,9 +130,8 @@ fn run_volume(run: &Run, grid: &VoxelGrid, backend: Box<dyn Backend>) -> Result<
     if wanted.technique == Some(SceneTechnique::Stack) {
         return Err(needs_grid(input, "--technique stack"));
     }
-    let of_stack = wanted::given(wanted, false).into_iter().find(|option| {
-        option.technique == SceneTechnique::Stack
-    });
+    let of_stack =
+        wanted::given(wanted, false).into_iter().find(|option| option.technique == SceneTechnique::Stack);
     let steps = (!args.stack.time_steps.is_empty()).then(|| "--time-steps".to_owned());
     if let Some(option) = of_stack.map(|option| option.to_string()).or(steps) {
         return Err(needs_grid(input, &option));

@@ -31,8 +31,7 @@ pub(crate) fn save_scene(
     // An infinite quality is full resolution, as without a focus; JSON has no infinity.
     scene.focus = scene.focus.filter(|focus| focus.quality.is_finite());
     if technique == SceneTechnique::Plane {
-        let plane =
-            |plane: &Plane| ScenePlane { normal: plane.normal.to_array(), distance: plane.distance };
+        let plane = |plane: &Plane| ScenePlane { normal: plane.normal.to_array(), distance: plane.distance };
         scene.planes = view.planes.planes.iter().map(plane).collect();
     }
     Ok(scene.write(path)?)

@@ -11,7 +11,8 @@ use volery::io::scene_file::{
 use volery::io::transfer::{TransferError, TransferOptions, TransferProblem};
 use volery::io::{one_of, read_transfer, read_transfer_2d};
 use volery::{
-    Focus, Input, InputData, Plane, PlaneView, Preset, Sampling, Slicing, StackView, Thickness, View, ViewOptions,
+    Focus, Input, InputData, Plane, PlaneView, Preset, Sampling, Slicing, StackView, Thickness, View,
+    ViewOptions,
 };
 
 use crate::Failure;
@@ -70,7 +71,8 @@ pub(crate) fn given(wanted: &SceneFile, is_of_scene: bool) -> Vec<Given> {
 /// Why options that one technique alone reads cannot stand together, or beside the technique asked for.
 pub(crate) fn conflict(wanted: &SceneFile, is_of_scene: bool) -> Option<String> {
     let given = given(wanted, is_of_scene);
-    let alone = |option: &Given| format!("{option} is read by --technique {} alone", name_of(option.technique));
+    let alone =
+        |option: &Given| format!("{option} is read by --technique {} alone", name_of(option.technique));
     // What suits an input may be planes or a stack, but never fans.
     let technique = wanted.technique;
     let is_unread = |option: &&Given| match technique {
@@ -228,7 +230,9 @@ fn check_applies(
 }
 
 fn has_own_values(name: &str) -> Failure {
-    Failure::undone(format!("{name} has values of its own, expected automatic colours or a colour map for --range"))
+    Failure::undone(format!(
+        "{name} has values of its own, expected automatic colours or a colour map for --range"
+    ))
 }
 
 fn unknown_preset(name: &str) -> Failure {

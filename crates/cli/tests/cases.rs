@@ -45,7 +45,8 @@ fn c1_render_ct_shows_the_ball_and_not_its_padding() {
         let inside = |radius, from_axis| if from_axis > 11.0 { padding } else { ball(radius) };
         shop.write_volume(&name, &cube(inside));
         shop.done(&format!("render {name} -o a.png --size 64x64"));
-        assert!(shop.bytes("a.png") == shop.bytes("plain.png"), "padding of {padding} shows");
+        let seen = num_seen(&shop, "a.png");
+        assert!(seen.abs_diff(plain) < plain / 4, "padding of {padding}: {seen} pixels, {plain} of the ball");
         // Noise in air does not bring the cylinder back.
         let mut state = 1_u32;
         let samples: Vec<i16> = (0..24 * 24 * 24)
@@ -90,20 +91,48 @@ fn c1_outliers_do_not_take_the_colours() {
     let (first, last) = colors("plain.nrrd", samples(None, 1));
     assert!(last > 400.0, "colours from {first} to {last}");
     // Three hot voxels, a fill of a tenth of the samples, and fill that others use.
-    for (name, outlier, every) in
-        [("hot.nrrd", 1e9, 800), ("fill.nrrd", 1e20, 2), ("missing.nrrd", 9.969_21e36, 3), ("low.nrrd", -1e30, 2)]
-    {
+    for (name, outlier, every) in [
+        ("hot.nrrd", 1e9, 800),
+        ("fill.nrrd", 1e20, 2),
+        ("missing.nrrd", 9.969_21e36, 3),
+        ("low.nrrd", -1e30, 2),
+    ] {
         let (start, end) = colors(name, samples(Some(outlier), every));
-        assert!((start - first).abs() < 60.0 && (end - last).abs() < 60.0, "{name}: colours from {start} to {end}");
-        assert!(num_seen(&shop, &format!("{name}.png")) > 300, "{name}");
+        assert!(
+            (start - first).abs() < 60.0 && (end - last).abs() < 60.0,
+            "{name}: colours from {start} to {end}"
+        );
     }
+    // Three hot voxels of 16 bits, the rest in a hundredth of the range.
+    let dim = |i: usize, hot: bool| {
+        let [x, y, z] = [i % 24, i / 24 % 24, i / 576].map(|index| index as f64 - 11.5);
+        let is_hot = hot && i % 5000 == 7;
+        if is_hot { u16::MAX } else { smooth((x * x + y * y + z * z).sqrt()) as u16 }
+    };
+    let seen = [false, true].map(|hot| {
+        let samples: Vec<u16> = (0..24 * 24 * 24).map(|i| dim(i, hot)).collect();
+        shop.write_volume("hot16.nrrd", &VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).unwrap());
+        shop.done("render hot16.nrrd -o a.png --size 64x64");
+        num_seen(&shop, "a.png")
+    });
+    assert!(seen[0] > 300 && seen[1] > seen[0] / 2, "{seen:?}");
 }
 
 #[test]
 fn c1_labels_and_masks_keep_every_value() {
     let shop = Workshop::new();
-    for (name, values) in [("mask", [0, 1, 1]), ("labels", [0, 1, 50]), ("far", [0, 255, 20000]), ("signed", [-5, 0, 3])] {
-        let value = |radius| if radius < 4.0 { values[2] } else if radius < 8.0 { values[1] } else { values[0] };
+    for (name, values) in
+        [("mask", [0, 1, 1]), ("labels", [0, 1, 50]), ("far", [0, 255, 20000]), ("signed", [-5, 0, 3])]
+    {
+        let value = |radius| {
+            if radius < 4.0 {
+                values[2]
+            } else if radius < 8.0 {
+                values[1]
+            } else {
+                values[0]
+            }
+        };
         shop.write_volume(format!("{name}.nrrd"), &cube(|radius, _| value(radius)));
         shop.done(&format!("render {name}.nrrd -o a.png --size 64x64 --report r.json"));
         let points = shop.json("r.json")["transfer_function"]["points"].clone();
@@ -125,7 +154,10 @@ fn b6_render_nothing_says_why() {
         "eye": [90, -70, 60], "target": [190, -120, 60], "up": [0, 0, 1], "fov_y_deg": 25}}"#;
     shop.write("away.json", away);
     let said = shop.done("render away.json -o o.png").stdout;
-    assert!(said.contains("nothing is seen: the camera does not look at the data, which lie from 0, 0, 0 to 39"), "{said}");
+    assert!(
+        said.contains("nothing is seen: the camera does not look at the data, which lie from 0, 0, 0 to 39"),
+        "{said}"
+    );
     let clear = r#"{"points": [{"value": 0, "color": [1, 1, 1], "opacity": 0}], "unit_distance": 1}"#;
     shop.write("clear.json", clear);
     let said = shop.done("render waves.nrrd -o o.png --size 8x8 --transfer clear.json").stdout;
@@ -138,10 +170,15 @@ fn b6_render_nothing_says_why() {
 fn b2_slice_flat_names_the_file_and_the_true_reason() {
     let shop = Workshop::new();
     let place = |from: [f64; 3], size: [f64; 3]| {
-        let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+        let corners =
+            [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
         let points: Vec<_> = corners
             .iter()
-            .map(|corner| [0, 1, 2].map(|axis| format!("{:e}", from[axis] + size[axis] * f64::from(corner[axis]))).join(" "))
+            .map(|corner| {
+                [0, 1, 2]
+                    .map(|axis| format!("{:e}", from[axis] + size[axis] * f64::from(corner[axis])))
+                    .join(" ")
+            })
             .collect();
         format!(
             "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n{}\nCELLS 1 9\n\
@@ -157,7 +194,10 @@ fn b2_slice_flat_names_the_file_and_the_true_reason() {
         ("slice far.vtk -o o.glb --count 1 --axis x", &["far.vtk", "1e300", "expected places within"]),
         ("slice far.vtk -o o.vsl --count 3 --axis x", &["far.vtk", "1e300"]),
         ("render far.vtk -o o.png --size 16x16", &["far.vtk", "1e300", "expected places within"]),
-        ("render fine.vtk -o o.png --size 16x16 --slices 300", &["fine.vtk", "slices apart", "expected fewer than 300"]),
+        (
+            "render fine.vtk -o o.png --size 16x16 --slices 300",
+            &["fine.vtk", "slices apart", "expected fewer than 300"],
+        ),
     ] {
         let outcome = shop.run_line(line);
         outcome.fails(1, words);
@@ -180,7 +220,8 @@ fn c15_tf_paraview_several_are_chosen_by_name() {
     shop.done(&format!("{line} -o a.png --transfer two.json --color-map second"));
     shop.done(&format!("{line} -o b.png --transfer second.json"));
     assert!(shop.bytes("a.png") == shop.bytes("b.png"));
-    shop.run_line(&format!("{line} -o c.png --transfer two.json --color-map secnd")).fails(1, &["secnd", "second"]);
+    shop.run_line(&format!("{line} -o c.png --transfer two.json --color-map secnd"))
+        .fails(1, &["secnd", "second"]);
 }
 
 #[test]

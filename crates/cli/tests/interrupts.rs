@@ -128,7 +128,8 @@ fn an_interrupt_ends_the_program_as_the_signal_says() {
     use std::os::unix::process::ExitStatusExt;
     let shop = Workshop::new();
     for (name, number) in [("-INT", 2), ("-TERM", 15), ("-HUP", 1)] {
-        let mut child = start(&shop, "render waves.nrrd --size 2000x2000 --backend software --verify -o a.png");
+        let mut child =
+            start(&shop, "render waves.nrrd --size 2000x2000 --backend software --verify -o a.png");
         std::thread::sleep(Duration::from_millis(300));
         assert!(child.try_wait().unwrap().is_none(), "it takes longer than that");
         let sent = Command::new("kill").args([name, &child.id().to_string()]).status().unwrap();
@@ -141,7 +142,8 @@ fn an_interrupt_ends_the_program_as_the_signal_says() {
          sleep 0.3; kill -HUP $!; wait $!",
         env!("CARGO_BIN_EXE_volery")
     );
-    let status = Command::new("sh").args(["-c", &script]).current_dir(shop.path("")).stdout(Stdio::null()).status();
+    let status =
+        Command::new("sh").args(["-c", &script]).current_dir(shop.path("")).stdout(Stdio::null()).status();
     assert!(status.unwrap().success());
     assert!(is_whole(&shop, "b.png"));
 }

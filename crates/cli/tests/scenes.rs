@@ -70,7 +70,10 @@ fn a_saved_scene_remakes_the_picture_bit_for_bit() {
             assert!(shop.bytes("a.exr") == shop.bytes("b.exr"), "{line}: {}", shop.json(saved));
             assert_eq!(schema().defects(&shop.json(saved)), Vec::<String>::new(), "{line}");
             // A scene that was saved says all, so saving it again changes nothing.
-            shop.done(&format!("render {saved} -o b.exr --save-scene {}", saved.replace("s.json", "t2.json")));
+            shop.done(&format!(
+                "render {saved} -o b.exr --save-scene {}",
+                saved.replace("s.json", "t2.json")
+            ));
             assert_eq!(shop.json(saved), shop.json(&saved.replace("s.json", "t2.json")), "{line}");
         }
         pictures.insert(shop.bytes("a.exr"));
@@ -99,7 +102,10 @@ fn a_scene_needs_its_input_alone() {
     assert_eq!(shop.json("r.json")["work"]["slices"], 20);
     shop.write("both.json", r#"{"input": {"file": "waves.nrrd"}, "slices": 20, "nearest": true}"#);
     shop.run_line("render both.json -o c.png").fails(1, &["both.json", "slices", "nearest"]);
-    shop.write("rays.json", r#"{"input": {"file": "waves.nrrd"}, "technique": "raycast", "show_nodes": true}"#);
+    shop.write(
+        "rays.json",
+        r#"{"input": {"file": "waves.nrrd"}, "technique": "raycast", "show_nodes": true}"#,
+    );
     shop.run_line("render rays.json -o c.png").fails(1, &["rays.json", "show_nodes is read by"]);
     assert!(!shop.names().contains(&"c.png".to_owned()));
 }
@@ -110,12 +116,20 @@ fn the_report_says_what_was_drawn_of_what() {
     shop.done("render hull.json -o a.png --report r.json --save-scene s.json");
     let (report, scene) = (shop.json("r.json"), shop.json("s.json"));
     assert_eq!(report["version"], env!("CARGO_PKG_VERSION"));
-    assert_eq!((&report["camera"], &report["transfer_function"]), (&scene["camera"], &scene["transfer_function"]));
-    let files: Vec<_> = report["inputs"].as_array().unwrap().iter().map(|file| {
-        let path = file["path"].as_str().unwrap();
-        assert_eq!(file["bytes"].as_u64(), Some(shop.bytes(path).len() as u64), "{path}");
-        path
-    }).collect();
+    assert_eq!(
+        (&report["camera"], &report["transfer_function"]),
+        (&scene["camera"], &scene["transfer_function"])
+    );
+    let files: Vec<_> = report["inputs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|file| {
+            let path = file["path"].as_str().unwrap();
+            assert_eq!(file["bytes"].as_u64(), Some(shop.bytes(path).len() as u64), "{path}");
+            path
+        })
+        .collect();
     assert_eq!(files, ["hull.json", "hull.obj", "waves.nrrd"]);
     shop.done("render image.png -o b.png --report r.json");
     assert_eq!(shop.json("r.json").get("transfer_function"), None);
@@ -218,7 +232,8 @@ fn the_schema_and_the_parser_agree() {
     let shown: BTreeSet<&String> =
         examples.iter().chain([&file]).flat_map(|example| example.as_object().unwrap().keys()).collect();
     assert_eq!(fields, shown);
-    let wrong = [json!(-3), json!([]), json!({"x": 1}), json!([1, 2, 3, 4, 5]), json!([-1, 2]), json!([2, 1, -5])];
+    let wrong =
+        [json!(-3), json!([]), json!({"x": 1}), json!([1, 2, 3, 4, 5]), json!([-1, 2]), json!([2, 1, -5])];
     let mut num_wrong = 0;
     for field in &fields {
         for value in wrong.iter().chain([&json!("such"), &json!(true), &json!(7.5)]) {
@@ -227,7 +242,10 @@ fn the_schema_and_the_parser_agree() {
             let (by_schema, by_parser) = (schema.defects(&scene), parse(&scene));
             // That ranges rise and normals have a length is more than a schema can say.
             let is_more = matches!(field.as_str(), "range") && by_schema.is_empty();
-            assert!(by_schema.is_empty() == by_parser.is_ok() || is_more, "{scene}: {by_schema:?} {by_parser:?}");
+            assert!(
+                by_schema.is_empty() == by_parser.is_ok() || is_more,
+                "{scene}: {by_schema:?} {by_parser:?}"
+            );
             num_wrong += usize::from(by_parser.is_err());
         }
     }
@@ -238,6 +256,7 @@ fn the_schema_and_the_parser_agree() {
     assert_eq!(known.iter().collect::<BTreeSet<_>>(), fields);
     let unknown = parse(&json!({"input": {"file": "a", "size": 1}})).unwrap_err().to_string();
     let known: BTreeSet<String> = unknown.split('`').skip(3).step_by(2).map(str::to_owned).collect();
-    let of_input: BTreeSet<&String> = schema.0["properties"]["input"]["properties"].as_object().unwrap().keys().collect();
+    let of_input: BTreeSet<&String> =
+        schema.0["properties"]["input"]["properties"].as_object().unwrap().keys().collect();
     assert_eq!(known.iter().collect::<BTreeSet<_>>(), of_input);
 }

@@ -106,7 +106,8 @@ fn wrong_usages_are_refused_in_one_line_that_helps() {
             }
             // An option of one technique beside the others.
             let technique = heading.strip_prefix("Technique ");
-            let others = ["raycast", "fans", "plane", "stack"].into_iter().filter(|other| Some(*other) != technique);
+            let others =
+                ["raycast", "fans", "plane", "stack"].into_iter().filter(|other| Some(*other) != technique);
             let value = match value.as_deref() {
                 None => "",
                 Some("NX,NY,NZ,D") => "=0,0,1,2",
@@ -211,10 +212,15 @@ fn what_a_file_cannot_answer_is_refused() {
 #[test]
 fn an_option_that_changes_the_technique_says_so() {
     let shop = Workshop::new();
-    for option in ["--focus 1,2,3", "--nearest", "--error 0.1", "--plane 0,0,1,9", "--transparent", "--show-nodes"] {
+    for option in
+        ["--focus 1,2,3", "--nearest", "--error 0.1", "--plane 0,0,1,9", "--transparent", "--show-nodes"]
+    {
         let said = shop.done(&format!("render waves.nrrd -o a.png --size 9x9 {option}")).stdout;
         let name = option.split(' ').next().unwrap();
-        assert!(said.contains(&format!("note: drawn by --technique plane, which alone reads {name}")), "{said}");
+        assert!(
+            said.contains(&format!("note: drawn by --technique plane, which alone reads {name}")),
+            "{said}"
+        );
     }
     assert!(!shop.done("render waves.nrrd -o a.png --size 9x9").stdout.contains("note:"));
 }

@@ -47,8 +47,8 @@ pub use layout::{ByteOrder, Element, ParseElementError};
 pub use mesh::{MeshFile, read_mesh};
 pub use near::{nearest, one_of};
 pub use out::{
-    Abandoned, Picture, WriteError, abandon_unfinished, check_writable, read_png_rgb, write_atomically, write_exr,
-    write_nrrd, write_png,
+    Abandoned, Picture, WriteError, abandon_unfinished, check_writable, read_png_rgb, write_atomically,
+    write_exr, write_nrrd, write_png,
 };
 pub use scene_file::SceneFile;
 pub use stack::{GlbOptions, read_stack, write_glb, write_vsl};

@@ -29,8 +29,8 @@ mod check;
 mod transfer;
 
 pub use camera::serialize_camera;
-pub use transfer::serialize as serialize_transfer;
 pub use check::{MAX_PIXELS, MAX_SIDE, SizeError, check_size};
+pub use transfer::serialize as serialize_transfer;
 
 /// Scene files larger than this are refused.
 const MAX_FILE_BYTES: u64 = 16 << 20;

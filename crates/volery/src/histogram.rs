@@ -86,8 +86,14 @@ impl Histogram {
         } else {
             (low - 0.5, 1.0, 1)
         };
-        let mut histogram =
-            Self { range: [low, high], start, bin_width, counts: vec![0; num_bins], blank: 0, counted: window.counted };
+        let mut histogram = Self {
+            range: [low, high],
+            start,
+            bin_width,
+            counts: vec![0; num_bins],
+            blank: 0,
+            counted: window.counted,
+        };
         let counted = for_samples!(samples, |values| histogram.count(values, channel));
         histogram.blank = counted.iter().map(|(_, blank)| blank).sum();
         for (counts, _) in counted {

@@ -20,7 +20,8 @@ fn against_vtk(name: &str, test: &str, rmse: f64, max: f64) {
     let tracer = GridTracer::new(&grid, &grid.arrays()[0].values, transfer_of(&scene)).unwrap();
     let [width, height] = scene.size.unwrap();
     let start = Instant::now();
-    let truth = tracer.render(&scene.camera.unwrap(), scene.background.unwrap(), width, height, &|_| {}).unwrap();
+    let truth =
+        tracer.render(&scene.camera.unwrap(), scene.background.unwrap(), width, height, &|_| {}).unwrap();
     println!("{name}: {:.1} s", start.elapsed().as_secs_f64());
     let vtk = volery_io::read_png_rgb(&scenes.join(format!("{name}.vtk.png"))).unwrap();
     let vtk = vtk.pixels.iter().map(|pixel| pixel.map(f64::from)).collect();

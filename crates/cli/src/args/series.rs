@@ -40,11 +40,14 @@ pub(super) fn conflict(args: &RenderArgs) -> Option<String> {
         let shown = path.display();
         if is_several && numbered(path, 0).is_none() {
             let of = if has_steps { "time step" } else { "frame" };
-            return Some(format!("{option} {shown}: expected a name with %d or %03d for the number of the {of}"));
+            return Some(format!(
+                "{option} {shown}: expected a name with %d or %03d for the number of the {of}"
+            ));
         }
         let way = if option == "-o" { ", or --frames or --time-steps for several files" } else { "" };
         let is_literal = !is_several && has_place(path);
-        is_literal.then(|| format!("{option} {shown}: has a place for a number, expected a name for one file{way}"))
+        is_literal
+            .then(|| format!("{option} {shown}: has a place for a number, expected a name for one file{way}"))
     };
     [output].into_iter().chain(others).find_map(problem)
 }

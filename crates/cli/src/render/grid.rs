@@ -9,8 +9,8 @@ use volery::io::{GridFile, GridOptions, recording_files};
 use volery::report::InputFile;
 use volery::{Backend, GridSession, Picture, QuantizedMesh, StackSession, StackView, StepChange, View};
 
-use super::files::{self, Done, Files};
 use super::Run;
+use super::files::{self, Done, Files};
 use crate::args::{RenderArgs, numbered};
 use crate::progress::Progress;
 use crate::{Failure, extent, say, wanted};
@@ -85,12 +85,7 @@ pub(super) fn run_stack(run: &Run, mesh: &QuantizedMesh, backend: Box<dyn Backen
 }
 
 /// Draws every time step by one view.
-fn time_steps(
-    run: &Run,
-    steps: &[TimeStep],
-    session: &mut GridSession,
-    view: &View,
-) -> Result<(), Failure> {
+fn time_steps(run: &Run, steps: &[TimeStep], session: &mut GridSession, view: &View) -> Result<(), Failure> {
     let args = run.args;
     let bar = Progress::bar("drawing time steps");
     for (number, step) in steps.iter().enumerate() {

@@ -253,10 +253,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("a");
         let named = |bytes: &[u8]| {
-            let (name, file) = with_free_name(&mut unfinished_names(), folder.path(), |name| {
-                File::create_new(name)
-            })
-            .unwrap();
+            let (name, file) =
+                with_free_name(&mut unfinished_names(), folder.path(), |name| File::create_new(name))
+                    .unwrap();
             let mut unfinished = Unfinished { file: BufWriter::new(file), name: Some(name) };
             unfinished.file.write_all(bytes).unwrap();
             unfinished

@@ -40,12 +40,16 @@ impl CameraJson {
             (ProjectionName::Perspective, Some(fov_y_deg), None) => Projection::Perspective { fov_y_deg },
             (ProjectionName::Orthographic, None, Some(height)) => Projection::Orthographic { height },
             (ProjectionName::Perspective, None, _) => {
-                return Err("camera.fov_y_deg is missing, expected the full vertical angle of a perspective camera"
-                    .to_owned());
+                return Err(
+                    "camera.fov_y_deg is missing, expected the full vertical angle of a perspective camera"
+                        .to_owned(),
+                );
             }
             (ProjectionName::Orthographic, _, None) => {
-                return Err("camera.height is missing, expected the height of an orthographic picture in world units"
-                    .to_owned());
+                return Err(
+                    "camera.height is missing, expected the height of an orthographic picture in world units"
+                        .to_owned(),
+                );
             }
             (_, Some(_), Some(_)) => {
                 return Err("camera.fov_y_deg and height are both there, expected fov_y_deg in perspective or height \

@@ -11,10 +11,7 @@ use crate::transfer::{Transfer2dJson, TransferJson};
 ///
 /// # Errors
 /// Those of the serialiser.
-pub fn serialize<S: Serializer>(
-    transfer: &Option<SceneTransfer>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+pub fn serialize<S: Serializer>(transfer: &Option<SceneTransfer>, serializer: S) -> Result<S::Ok, S::Error> {
     match transfer {
         None => serializer.serialize_none(),
         Some(SceneTransfer::Values(function)) => TransferJson::new(function).serialize(serializer),
@@ -26,7 +23,8 @@ pub fn serialize<S: Serializer>(
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<SceneTransfer>, D::Error> {
-    let in_field = |problem: &dyn std::fmt::Display| D::Error::custom(format!("transfer_function: {problem}"));
+    let in_field =
+        |problem: &dyn std::fmt::Display| D::Error::custom(format!("transfer_function: {problem}"));
     Ok(Some(match Value::deserialize(deserializer)? {
         Value::Null => return Ok(None),
         Value::String(name) => SceneTransfer::Preset(name),

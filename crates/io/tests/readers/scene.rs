@@ -99,8 +99,16 @@ fn what_a_scene_cannot_be() {
         ("\"name\"", "\"error\": -1, \"name\"", "error is -1.0, expected a number in [0, 1]"),
         ("\"name\"", "\"adaptive\": 1.5, \"name\"", "adaptive is 1.5, expected a number in [0, 1]"),
         ("\"name\"", "\"slices\": 0, \"name\"", "slices is 0, expected 1 to"),
-        ("\"name\"", "\"technique\": \"rays\", \"name\"", "unknown variant `rays`, expected one of `raycast`"),
-        ("\"name\"", "\"focus\": {\"point\": [0, 0, 0], \"quality\": -1}, \"name\"", "focus.quality is -1.0, expected at least 0"),
+        (
+            "\"name\"",
+            "\"technique\": \"rays\", \"name\"",
+            "unknown variant `rays`, expected one of `raycast`",
+        ),
+        (
+            "\"name\"",
+            "\"focus\": {\"point\": [0, 0, 0], \"quality\": -1}, \"name\"",
+            "focus.quality is -1.0, expected at least 0",
+        ),
         (
             "\"name\"",
             "\"planes\": [{\"normal\": [0, 0, 0], \"distance\": 1}], \"name\"",
@@ -163,7 +171,9 @@ fn a_scene_needs_its_input_alone_and_comes_back_bit_for_bit() {
 
 #[test]
 fn the_name_of_a_type_is_read_as_that_type() {
-    for name in ["u1", "i1", "<u2", ">u2", "<i2", ">i2", "<u4", ">u4", "<i4", ">i4", "<f4", ">f4", "<f8", ">f8"] {
+    for name in
+        ["u1", "i1", "<u2", ">u2", "<i2", ">i2", "<u4", ">u4", "<i4", ">i4", "<f4", ">f4", "<f8", ">f8"]
+    {
         let element: Element = name.parse().unwrap();
         assert_eq!(element.to_string(), name);
     }

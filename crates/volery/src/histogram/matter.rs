@@ -68,7 +68,9 @@ impl Histogram {
         let [low, high] = self.range;
         let gap = |below: usize, above: usize| (above - below - 1) as f64;
         let is_fill = high >= HUGE && low < HUGE
-            || MISSING.contains(&high) && used.len() > 2 && gap(before, last) >= FAR * (before + 1 - first) as f64;
+            || MISSING.contains(&high)
+                && used.len() > 2
+                && gap(before, last) >= FAR * (before + 1 - first) as f64;
         if is_fill {
             let ceiling = edge(before + 1).min(high.next_down());
             return Some(Window { range: [low, ceiling], counted: [window.counted[0], ceiling] });

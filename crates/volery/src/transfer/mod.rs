@@ -89,12 +89,7 @@ impl Preset {
     ///
     /// # Panics
     /// Never: samples have a first channel.
-    pub fn over(
-        self,
-        samples: &Samples,
-        range: Option<[f64; 2]>,
-        extent: DVec3,
-    ) -> Option<TransferFunction> {
+    pub fn over(self, samples: &Samples, range: Option<[f64; 2]>, extent: DVec3) -> Option<TransferFunction> {
         let histogram = match range {
             Some(range) => Histogram::within(samples, 0, range),
             None => Histogram::of_matter(samples, 0),
@@ -131,7 +126,8 @@ impl Preset {
             Self::CtBone => hounsfield(&CT_BONE),
             Self::CtSoftTissue => hounsfield(&CT_SOFT_TISSUE),
         };
-        if let Some(&last) = points.last().filter(|_| self.is_automatic() && histogram.counted[1].is_finite()) {
+        if let Some(&last) = points.last().filter(|_| self.is_automatic() && histogram.counted[1].is_finite())
+        {
             // Nothing of what is above stands for matter.
             let ceiling = histogram.counted[1].max(last.value).next_up();
             points.push(ControlPoint { value: ceiling, ..last });
