@@ -30,8 +30,8 @@ pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
     /// Threads to use; as many as there are cores if missing
-    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(crate) threads: Option<u16>,
+    #[arg(long, value_name = "N", global = true, value_parser = whole(1024))]
+    pub(crate) threads: Option<u32>,
 }
 
 /// What to do.
@@ -134,7 +134,7 @@ pub(crate) struct RenderArgs {
     pub(crate) save_scene: Option<PathBuf>,
     /// Draw the picture so often, and report the time of each and their median; with a place for a number in OUT, such
     /// as OUT-%03d.png, each is a file of its own
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_000_000))]
     pub(crate) frames: u32,
 }
 
@@ -345,6 +345,14 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let size = numbers.ok_or("expected WIDTHxHEIGHT in pixels, such as 800x600")?;
     volery::io::scene_file::check_size(size).map_err(|problem| problem.to_string())?;
     Ok(size)
+}
+
+/// Reads a whole number from 1 to `max`.
+fn whole(max: u32) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let found = text.parse().ok().filter(|number| (1..=max).contains(number));
+        found.ok_or_else(|| format!("expected a whole number from 1 to {max}"))
+    }
 }
 
 fn parse_view(text: &str) -> Result<Direction, String> {

@@ -100,7 +100,7 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<(), Failure> {
     interrupts::watch()?;
     if let Some(threads) = cli.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global()?;
     }
     match cli.command {
         Command::Render(args) => render::run(&args),

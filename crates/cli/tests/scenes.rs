@@ -94,8 +94,8 @@ fn a_saved_scene_remakes_the_picture_bit_for_bit() {
 fn a_scene_needs_its_input_alone() {
     let shop = workshop();
     shop.write("least.json", r#"{"input": {"file": "waves.nrrd"}}"#);
-    shop.done("render least.json -o a.png");
-    shop.done("render waves.nrrd -o b.png");
+    shop.done("render least.json -o a.png --size 40x30");
+    shop.done("render waves.nrrd -o b.png --size 40x30");
     assert!(shop.bytes("a.png") == shop.bytes("b.png"));
     shop.write("cells.json", r#"{"input": {"file": "data/cells.vtk"}, "slices": 20, "size": [30, 30]}"#);
     shop.done("render cells.json -o a.png --report r.json");

@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::whole;
+
 /// What the technique stack alone reads.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Technique stack")]
 pub(crate) struct StackArgs {
     /// Planes over the extent of the grid; with --adaptive those of the first step [default: 128]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    #[arg(long, value_name = "N", value_parser = whole(1 << 24))]
     pub(crate) slices: Option<u32>,
     /// Put more planes between others where cells are, until this share of the cells is met
     #[arg(long, value_name = "SHARE", value_parser = parse_share, allow_negative_numbers = true)]
