@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
+use volery::io::is_grid;
 use volery::io::scene_file::{SceneBackend, SceneFile, SceneTechnique};
 use volery::output::write_image;
 use volery::{
@@ -40,6 +41,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     wanted.meshes.clone_from(&plan.meshes);
     if let Some(problem) = wanted::conflict(&wanted, true) {
         return Err(Failure::of_file(&args.input, problem));
+    }
+    let file = &plan.input.file;
+    if !args.stack.time_steps.is_empty() && file.is_file() && !is_grid(file) {
+        return Err(Failure::of_file(file, "is no unstructured grid, expected one for --time-steps"));
     }
     let steps = grid::steps(&args.stack.time_steps)?;
     let outputs = outputs(args, steps.len());
