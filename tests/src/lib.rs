@@ -15,6 +15,8 @@ use volery::{
 use volery_frame::{
     Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, UploadError, VolumeLayout,
 };
+use volery_io::SceneFile;
+use volery_io::scene_file::SceneTransfer;
 use volery_reference::metrics::{Comparison, compare};
 use volery_scene::{Camera, TransferFunction, VoxelGrid};
 
@@ -59,10 +61,13 @@ pub fn read_scene(data: &Path, name: &str) -> Input {
 /// What a scene file says to draw, at full resolution.
 ///
 /// # Panics
-/// When the input came without a scene file.
+/// When the input came without a scene file, or one that leaves something open.
 pub fn view_of(input: &Input) -> View {
     let scene = input.scene.as_ref().expect("read from a scene file");
-    let view = matter_view(scene.camera, scene.transfer.clone(), scene.background, scene.size);
+    let size = scene.size.expect("a scene with a size");
+    let camera = scene.camera.expect("a scene with a camera");
+    let background = scene.background.expect("a scene with a background");
+    let view = matter_view(camera, transfer_of(scene).clone(), background, size);
     View { meshes: input.meshes.clone(), ..view }
 }
 
@@ -84,6 +89,17 @@ pub fn matter_view(
         thickness: Thickness::default(),
         stack: StackView::default(),
         meshes: [].into(),
+    }
+}
+
+/// The transfer function of a scene that has one over values.
+///
+/// # Panics
+/// When it has none, or another.
+pub fn transfer_of(scene: &SceneFile) -> &TransferFunction {
+    match &scene.transfer {
+        Some(SceneTransfer::Values(transfer)) => transfer,
+        other => panic!("expected a transfer function over values, found {other:?}"),
     }
 }
 

@@ -7,13 +7,21 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use volery::fit::Direction;
 use volery::glam::DVec3;
-use volery::{BackendChoice, Plane, Preset, Thickness};
+use volery::io::one_of;
+use volery::io::scene_file::{SceneInput, SceneThickness};
+use volery::{BackendChoice, Plane, Preset};
 
+use crate::wanted;
+
+mod file;
+mod series;
 mod slice;
 mod stack;
 
+pub(crate) use file::FileArgs;
+pub(crate) use series::numbered;
 pub(crate) use slice::SliceArgs;
-pub(crate) use stack::{StackArgs, numbered};
+pub(crate) use stack::StackArgs;
 
 /// Draws scientific volumes and says how far the picture is from the truth.
 #[derive(Debug, Parser)]
@@ -22,8 +30,8 @@ pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
     /// Threads to use; as many as there are cores if missing
-    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(crate) threads: Option<u16>,
+    #[arg(long, value_name = "N", global = true, value_parser = whole(1024))]
+    pub(crate) threads: Option<u32>,
 }
 
 /// What to do.
@@ -65,9 +73,8 @@ pub(crate) struct RenderArgs {
     /// How to draw
     #[arg(long, value_enum, default_value_t = Technique::Auto)]
     pub(crate) technique: Technique,
-    /// The array to draw, of files that have several [default: the scene's, else the file's own]
-    #[arg(long, value_name = "NAME")]
-    pub(crate) array: Option<String>,
+    #[command(flatten)]
+    pub(crate) file: FileArgs,
     /// Width and height of the picture in pixels [default: the scene's, else 768x768]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(crate) size: Option<[u32; 2]>,
@@ -81,6 +88,16 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "FILE.json|PRESET",
         value_parser = OsStringValueParser::new().try_map(parse_transfer))]
     pub(crate) transfer: Option<Transfer>,
+    /// The map to take from a file of several that --transfer names
+    #[arg(long, value_name = "NAME", requires = "transfer")]
+    pub(crate) color_map: Option<String>,
+    /// Values over which automatic colours and colour maps run; those beyond have the colours of the ends
+    /// [default: the scene's, else most of the values, without what stands for no data]
+    #[arg(long, value_name = "LOW,HIGH", value_parser = parse_range, allow_hyphen_values = true)]
+    pub(crate) range: Option<[f64; 2]>,
+    /// Linear colour behind everything, each number from 0 to 1 [default: the scene's, else nearly black]
+    #[arg(long, value_name = "R,G,B", value_parser = parse_background, allow_hyphen_values = true)]
+    pub(crate) background: Option<[f64; 3]>,
     /// Largest difference of a value from the full resolution, as a fraction of the file's value range
     #[arg(long, value_name = "T", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
@@ -111,8 +128,13 @@ pub(crate) struct RenderArgs {
     /// Write input, times, work and error as JSON
     #[arg(long, value_name = "OUT.json")]
     pub(crate) report: Option<PathBuf>,
-    /// Draw the picture so often, and report the time of each and their median
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    /// Write a scene file that draws the same picture, bit for bit
+    #[arg(long, value_name = "OUT.json",
+        value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["json"])))]
+    pub(crate) save_scene: Option<PathBuf>,
+    /// Draw the picture so often, and report the time of each and their median; with a place for a number in OUT, such
+    /// as OUT-%03d.png, each is a file of its own
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_000_000))]
     pub(crate) frames: u32,
 }
 
@@ -146,55 +168,54 @@ pub(crate) struct PlaneArgs {
 }
 
 impl Cli {
-    /// Finds options that the technique asked for would not read, and names without a place for a number.
+    /// Finds options that would not be read, and names without a place for a number.
     pub(crate) fn checked(self) -> Result<Self, clap::Error> {
-        let Command::Render(args) = &self.command else { return Ok(self) };
-        match args.conflict() {
+        let problem = match &self.command {
+            Command::Render(args) => args.conflict(),
+            Command::Info(args) => data_without_scene(args.data.as_ref(), &args.input),
+            Command::Slice(args) => args.conflict(),
+            Command::Demo(_) => None,
+        };
+        match problem {
             None => Ok(self),
             Some(message) => Err(Self::command().error(ErrorKind::ArgumentConflict, message)),
         }
     }
 }
 
+fn data_without_scene(data: Option<&PathBuf>, input: &Path) -> Option<String> {
+    let unread = data.is_some() && !has_ending(input, &["json"]);
+    unread.then(|| {
+        let input = input.display();
+        format!(
+            "--data is for the paths in a scene file, {input} is none: expected a name that ends in .json"
+        )
+    })
+}
+
 impl RenderArgs {
     fn conflict(&self) -> Option<String> {
-        let of_fans = self.thickness.map(|_| "--thickness");
-        let options = [
-            (self.planes.given(), Technique::Plane),
-            (of_fans, Technique::Fans),
-            (self.stack.given(), Technique::Stack),
-        ];
-        let given = || options.iter().filter_map(|&(option, needed)| Some((option?, needed)));
-        let is_unread = |(_, needed): &(&str, Technique)| {
-            // What suits an input may be planes or a stack, but never fans.
-            let auto = *needed != Technique::Fans && self.technique == Technique::Auto;
-            self.technique != *needed && !auto
+        let wanted = wanted::over(self, None, SceneInput::default());
+        let is_stack = self.technique == Technique::Stack;
+        let unread = || {
+            let option = self.unread_by_stack().filter(|_| is_stack)?;
+            Some(format!("{option} is not read by --technique stack"))
         };
-        if let Some((option, needed)) = given().find(is_unread) {
-            return Some(format!("{option} is read by --technique {} alone", needed.name()));
-        }
-        if let [(option, _), (other, needed)] = given().collect::<Vec<_>>()[..] {
-            return Some(format!("{other} is read by --technique {} alone, {option} is not", needed.name()));
-        }
-        if let Some(option) = self.unread_by_stack().filter(|_| self.technique == Technique::Stack) {
-            return Some(format!("{option} is not read by --technique stack"));
-        }
-        if self.stack.time_steps.is_empty() {
-            return None;
-        }
-        let names = [
-            ("-o", Some(&self.output)),
-            ("--error-map", self.error_map.as_ref()),
-            ("--report", self.report.as_ref()),
-        ];
-        let unnumbered = |(option, path): (&str, Option<&PathBuf>)| {
-            let path = path.filter(|path| numbered(path, 0).is_none())?;
-            Some(format!(
-                "{option} {}: expected a name with %d or %03d for the number of the time step",
-                path.display()
-            ))
+        let steps = || {
+            let technique = self.technique.name();
+            let steps = !self.stack.time_steps.is_empty() && !is_stack && self.technique != Technique::Auto;
+            steps.then(|| format!("--time-steps is read by --technique stack alone, not by {technique}"))
         };
-        names.into_iter().find_map(unnumbered)
+        let map = || match (&self.color_map, &self.transfer) {
+            (Some(_), Some(Transfer::Preset(preset))) => Some(format!(
+                "--color-map chooses from a file, {} is a name: expected a file that ends in .json for --transfer",
+                preset.name()
+            )),
+            _ => None,
+        };
+        let conflict = wanted::conflict(&wanted, false).or_else(unread).or_else(steps).or_else(map);
+        let data = || data_without_scene(self.data.as_ref(), &self.input);
+        conflict.or_else(data).or_else(|| series::conflict(self))
     }
 
     /// Whether the exact picture is wanted.
@@ -202,28 +223,11 @@ impl RenderArgs {
         self.verify || self.error_map.is_some()
     }
 
-    /// An option that is given, and means nothing for grids.
+    /// An option that is given, and means nothing for grids, beside those of other techniques.
     pub(crate) fn unread_by_stack(&self) -> Option<&'static str> {
         let others =
             [("--tolerance", self.tolerance.is_some()), ("--progressive", self.progressive.is_some())];
-        let others = others.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name);
-        self.planes.given().or(self.thickness.map(|_| "--thickness")).or(others)
-    }
-}
-
-impl PlaneArgs {
-    /// The first option that is given.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        let Self { planes, focus, quality: _, error, transparent, nearest, show_nodes } = self;
-        let given = [
-            ("--plane", !planes.is_empty()),
-            ("--focus", focus.is_some()),
-            ("--error", error.is_some()),
-            ("--transparent", *transparent),
-            ("--nearest", *nearest),
-            ("--show-nodes", *show_nodes),
-        ];
-        given.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name)
+        others.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name)
     }
 }
 
@@ -235,6 +239,8 @@ pub(crate) struct InfoArgs {
     /// A volume, an image, or a scene file
     #[arg(value_name = "FILE")]
     pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) file: FileArgs,
     /// Folder that the path in a scene file is relative to [default: that of the scene file]
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
@@ -288,7 +294,7 @@ pub(crate) enum ThicknessName {
     Interpolated,
 }
 
-impl From<ThicknessName> for Thickness {
+impl From<ThicknessName> for SceneThickness {
     fn from(name: ThicknessName) -> Self {
         match name {
             ThicknessName::Exact => Self::Exact,
@@ -341,6 +347,14 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
     Ok(size)
 }
 
+/// Reads a whole number from 1 to `max`.
+fn whole(max: u32) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let found = text.parse().ok().filter(|number| (1..=max).contains(number));
+        found.ok_or_else(|| format!("expected a whole number from 1 to {max}"))
+    }
+}
+
 fn parse_view(text: &str) -> Result<Direction, String> {
     let expected = "expected AZIMUTH,ELEVATION or AZIMUTH,ELEVATION,ZOOM: degrees, and a zoom above 0";
     let numbers: Vec<f64> =
@@ -364,6 +378,18 @@ fn parse_tolerance(text: &str) -> Result<f64, String> {
 /// As many numbers as `text` has between commas.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|part| part.trim().parse().ok()).collect()
+}
+
+fn parse_range(text: &str) -> Result<[f64; 2], String> {
+    let range = numbers(text).and_then(|numbers| <[f64; 2]>::try_from(numbers).ok());
+    let range = range.filter(|[low, high]| low < high && (high - low).is_finite());
+    range.ok_or_else(|| "expected LOW,HIGH: two finite values, the lower first".to_owned())
+}
+
+fn parse_background(text: &str) -> Result<[f64; 3], String> {
+    let color = numbers(text).and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    let color = color.filter(|color| color.iter().all(|channel| (0.0..=1.0).contains(channel)));
+    color.ok_or_else(|| "expected R,G,B: three numbers from 0 to 1".to_owned())
 }
 
 fn parse_plane(text: &str) -> Result<Plane, String> {
@@ -406,7 +432,8 @@ fn parse_transfer(name: std::ffi::OsString) -> Result<Transfer, String> {
         return Ok(Transfer::File(path));
     }
     let names: Vec<_> = Preset::all().map(Preset::name).collect();
-    Err(format!("expected a file that ends in .json, or one of {}", names.join(", ")))
+    let name = path.to_string_lossy();
+    Err(format!("expected a file that ends in .json, or one of {}", one_of(&name, &names)))
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! `volery demo`: every technique and dial there is on generated volumes and cells, with time and error of each.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use volery::glam::DVec3;
@@ -10,7 +11,9 @@ use volery::{
 };
 
 use crate::args::DemoArgs;
+use crate::outputs::Outputs;
 use crate::progress::Progress;
+use crate::quiet::hush_drivers;
 use crate::sheet::{Tile, contact_sheet};
 use crate::{Failure, say};
 
@@ -64,8 +67,14 @@ fn scenes() -> [Scene; 2] {
 
 pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
     let folder = args.output.as_path();
+    let is_picture = |name: &OsStr| Path::new(name).extension().is_some_and(|ending| ending == "png");
+    Outputs::default().folder("-o", folder, is_picture).check([])?;
+    let choice = BackendChoice::from(args.backend);
+    if choice.loads_drivers() {
+        hush_drivers();
+    }
     std::fs::create_dir_all(folder)
-        .map_err(|error| Failure(format!("{}: cannot be made: {error}", folder.display())))?;
+        .map_err(|error| Failure::of_file(folder, format_args!("cannot be made: {error}")))?;
     say("data            picture             ms a frame  pieces  max error      rmse")?;
     let mut sheet = Sheet { folder, tiles: Vec::new() };
     for scene in scenes() {

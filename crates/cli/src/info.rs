@@ -1,6 +1,6 @@
 //! `volery info`
 
-use volery::{GridInfo, Info, InputData, StackInfo, read_input};
+use volery::{GridInfo, Info, InputData, InputOptions, StackInfo};
 
 use crate::args::InfoArgs;
 use crate::progress::Progress;
@@ -8,7 +8,8 @@ use crate::{Failure, say};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let busy = Progress::spinner("reading");
-    let input = read_input(&args.input, args.data.as_deref())?;
+    let options = InputOptions { data_dir: args.data.clone(), input: args.file.of_scene() };
+    let input = options.find(&args.input)?.read()?;
     let text = match input.data {
         InputData::Grid(file) => {
             let info = GridInfo::of(&input.path, file)?;

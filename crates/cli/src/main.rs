@@ -5,26 +5,73 @@
 
 mod args;
 mod demo;
+mod drawn;
+mod extent;
 mod info;
+mod interrupts;
+mod outputs;
 mod progress;
+mod quiet;
 mod render;
+mod save;
 mod sheet;
 mod slice;
+mod wanted;
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
 
 use crate::args::{Cli, Command};
 
-/// Why a command could not be done: one line.
-struct Failure(String);
+/// Why a command could not be done: one line, and the exit status.
+struct Failure {
+    message: String,
+    status: u8,
+}
+
+impl Failure {
+    /// It could not be done.
+    fn undone(message: impl Into<String>) -> Self {
+        Self { message: message.into(), status: 1 }
+    }
+
+    /// The command line is wrong.
+    fn usage(message: impl Into<String>) -> Self {
+        Self { message: message.into(), status: 2 }
+    }
+
+    /// The same of a file.
+    fn of_file(path: &Path, error: impl Display) -> Self {
+        Self::undone(format!("{}: {}", path.display(), short_numbers(&error.to_string())))
+    }
+}
+
+/// A text in which numbers have no hundreds of digits.
+fn short_numbers(text: &str) -> String {
+    const LONGEST: usize = 24;
+    let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+    let mut short = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(start) = rest.find(is_digit) {
+        let (before, number) = rest.split_at(start);
+        let (number, after) = number.split_at(number.find(|c| !is_digit(c)).unwrap_or(number.len()));
+        short += before;
+        match number.parse::<f64>() {
+            Ok(value) if number.len() > LONGEST => short += &format!("{value:e}"),
+            _ => short += number,
+        }
+        rest = after;
+    }
+    short + rest
+}
 
 impl<E: std::error::Error> From<E> for Failure {
     fn from(error: E) -> Self {
-        Self(error.to_string())
+        Self::undone(error.to_string())
     }
 }
 
@@ -43,16 +90,17 @@ fn main() -> ExitCode {
     };
     match run(cli) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(Failure(message)) => {
+        Err(Failure { message, status }) => {
             complain(&format!("error: {message}"));
-            ExitCode::FAILURE
+            ExitCode::from(status)
         }
     }
 }
 
 fn run(cli: Cli) -> Result<(), Failure> {
+    interrupts::watch()?;
     if let Some(threads) = cli.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global()?;
     }
     match cli.command {
         Command::Render(args) => render::run(&args),
@@ -62,10 +110,15 @@ fn run(cli: Cli) -> Result<(), Failure> {
     }
 }
 
-/// The first paragraph of a message of clap in one line, and where to read more.
+/// The first paragraph of a message of clap in one line, what may have been meant, and where to read more.
 fn one_line_of_usage(message: &str) -> String {
     let paragraph: Vec<_> = message.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
-    format!("{} (see --help)", paragraph.join(" "))
+    let tips: String = message
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("tip: "))
+        .map(|tip| format!("; {tip}"))
+        .collect();
+    format!("{}{tips} (see --help)", paragraph.join(" "))
 }
 
 /// Prints one line to stderr, whatever is in it.
@@ -82,7 +135,23 @@ fn complain(message: &str) {
 fn say(text: impl Display) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure(format!("stdout: {error}"))),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::undone(format!("stdout: {error}")))
+        }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_errors_are_short_and_stay_what_they_are() {
+        for text in ["", "plane 1 at 0.30000000000000004", "sizes 1.2.840.113619.2.55.3.604688119.969.1"] {
+            assert_eq!(short_numbers(text), text);
+        }
+        let long = format!("position -{} of plane 1", f64::MAX);
+        assert_eq!(short_numbers(&long), "position -1.7976931348623157e308 of plane 1");
     }
 }

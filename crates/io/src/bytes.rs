@@ -4,10 +4,12 @@
 //! storage that at most doubles when it is full, and a file is only mapped or read up to the size it has.
 #![allow(unsafe_code, reason = "a memory map is unsafe by nature: see `load`")]
 
+use std::cell::RefCell;
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::ops::Deref;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bytemuck::Pod;
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
@@ -39,8 +41,33 @@ impl Deref for FileBytes {
     }
 }
 
+thread_local! {
+    /// What [`recording_files`] has seen so far, while it runs.
+    static OPENED: RefCell<Option<Vec<OpenedFile>>> = const { RefCell::new(None) };
+}
+
+/// A file that a reader opened.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct OpenedFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Its size.
+    pub bytes: u64,
+}
+
+/// Runs a reader of this crate, and says which files it opened, each once: the one asked for, and all that it names.
+pub fn recording_files<R>(read: impl FnOnce() -> R) -> (R, Vec<OpenedFile>) {
+    let before = OPENED.replace(Some(Vec::new()));
+    let result = read();
+    let mut opened = OPENED.replace(before).unwrap_or_default();
+    let mut seen = HashSet::new();
+    opened.retain(|file| seen.insert(file.clone()));
+    (result, opened)
+}
+
 /// Opens a regular file that is not empty; returns its length too. Devices and pipes are refused, since
-/// they may never end.
+/// they may never end. Every reader opens its files here and in the thread that called it, for
+/// [`recording_files`] to know.
 pub(crate) fn open(path: &Path) -> Result<(File, u64), Problem> {
     let metadata = std::fs::metadata(path).map_err(Problem::Io)?;
     let kind = |found, expected| Err(Problem::Kind { found, expected });
@@ -53,7 +80,13 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64), Problem> {
     if metadata.len() == 0 {
         return kind("empty", "a file with content");
     }
-    Ok((File::open(path).map_err(Problem::Io)?, metadata.len()))
+    let file = File::open(path).map_err(Problem::Io)?;
+    OPENED.with_borrow_mut(|opened| {
+        if let Some(opened) = opened {
+            opened.push(OpenedFile { path: path.to_owned(), bytes: metadata.len() });
+        }
+    });
+    Ok((file, metadata.len()))
 }
 
 /// The whole content of a file.

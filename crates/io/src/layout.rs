@@ -1,8 +1,10 @@
 //! How samples lie in a file: dims, type, byte order; checked before a byte of them is read.
 
+use std::fmt;
 use std::str::FromStr;
 
 use glam::DVec3;
+use serde::Serialize;
 use volery_scene::SampleType;
 
 use crate::error::{Problem, quoted};
@@ -61,7 +63,8 @@ pub(crate) fn swap_scalars(sample: SampleType) -> Option<usize> {
 
 /// The type of a sample in a file and its byte order, by its numpy name: `uint8`, `<i2`, `>f4`,
 /// `float32`; also `uint16be`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "String")]
 pub struct Element {
     /// The type.
     pub sample: SampleType,
@@ -104,6 +107,31 @@ impl FromStr for Element {
             _ => return Err(ParseElementError { found: quoted(name) }),
         };
         Ok(Self { sample, order })
+    }
+}
+
+impl From<Element> for String {
+    fn from(element: Element) -> Self {
+        element.to_string()
+    }
+}
+
+/// The numpy name, `u1` or `>u2`, which [`Element::from_str`] reads.
+impl fmt::Display for Element {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let order = match (swap_scalars(self.sample), self.order) {
+            (None, _) => "",
+            (Some(_), ByteOrder::Little) => "<",
+            (Some(_), ByteOrder::Big) => ">",
+        };
+        // Names of ours count bits, those of numpy bytes.
+        let name = self.sample.name();
+        match name.split_at_checked(1) {
+            Some((letter, bits)) if bits.parse::<usize>().is_ok() => {
+                write!(f, "{order}{letter}{}", self.sample.bytes())
+            }
+            _ => f.write_str(name),
+        }
     }
 }
 

@@ -14,7 +14,8 @@
 //!   dictionary of LZMA 64 MiB); an image may be at most 4096 times its file. No input panics, and none is waited for: devices and pipes are
 //!   refused. An error is one line: which file, which field, what was found, what was expected.
 //! - *Nothing is lost in silence.* Cells left out, values averaged, pieces joined: each is a note beside the data.
-//! - *No half file.* Output is written beside its place and renamed.
+//! - *No half file.* Output is written beside its place and then takes it, whatever ends the process
+//!   ([`write_atomically`]).
 //! - *No copy without need.* Large uncompressed files of the machine's byte order are mapped. They must not
 //!   be changed while the volume lives, as with every memory map.
 //!
@@ -32,6 +33,7 @@ mod error;
 pub mod grid;
 mod layout;
 pub mod mesh;
+mod near;
 mod numbers;
 mod orientation;
 mod out;
@@ -42,12 +44,17 @@ pub mod transfer;
 mod volume;
 mod vtk_xml;
 
+pub use bytes::{OpenedFile, recording_files};
 pub use error::{Problem, ReadError};
 pub use grid::{GridFile, GridOptions, is_grid, read_grid};
 pub use layout::{ByteOrder, Element, ParseElementError};
 pub use mesh::{MeshFile, read_mesh};
+pub use near::{nearest, one_of};
 pub use orientation::{Orientation, World};
-pub use out::{Picture, WriteError, read_png_rgb, write_atomically, write_exr, write_nrrd, write_png};
+pub use out::{
+    Abandoned, Picture, WriteError, abandon_unfinished, check_writable, read_png_rgb, write_atomically,
+    write_exr, write_nrrd, write_png,
+};
 pub use scene_file::SceneFile;
 pub use stack::{GlbOptions, read_stack, write_glb, write_vsl};
 pub use transfer::{

@@ -2,25 +2,18 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::path::Path;
 
 use exr::prelude::{Encoding, Image, SpecificChannels, WritableImage};
 use volery_scene::{SampleType, Samples, VoxelGrid, for_samples};
 
-use crate::error::{OneLine, ReadError};
+use crate::error::ReadError;
 use crate::layout::ByteOrder;
 use crate::volume::read_png;
 
-/// A file that could not be written.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: cannot be written: {}", OneLine(.path.display()), OneLine(.source))]
-pub struct WriteError {
-    /// The file as asked for.
-    pub path: PathBuf,
-    /// What the system or the encoder says.
-    pub source: io::Error,
-}
+mod whole;
+
+pub use whole::{Abandoned, WriteError, abandon_unfinished, check_writable, write_atomically};
 
 /// A picture in linear RGB, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,63 +24,6 @@ pub struct Picture {
     pub height: u32,
     /// All pixels, row by row.
     pub pixels: Vec<[f32; 3]>,
-}
-
-/// Writes a file so that it is whole or not there: `write` fills a new file beside `path`, which then
-/// takes the place of `path`. A symbolic link keeps pointing where it did; a device such as `/dev/null` is
-/// written as it is.
-///
-/// # Errors
-/// When the file cannot be made, filled or renamed; nothing is left behind then.
-pub fn write_atomically(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), WriteError> {
-    write_and_rename(path, write).map_err(|source| WriteError { path: path.to_owned(), source })
-}
-
-/// Deletes the unfinished file unless it was renamed.
-struct Unfinished(Option<PathBuf>);
-
-impl Drop for Unfinished {
-    fn drop(&mut self) {
-        if let Some(path) = self.0.take() {
-            // Nothing can be done about a failure here, and the cause is already on its way.
-            let _ = std::fs::remove_file(path);
-        }
-    }
-}
-
-fn write_and_rename(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> io::Result<()> {
-    static COUNTER: AtomicU64 = AtomicU64::new(0);
-    let target = match std::fs::canonicalize(path) {
-        Ok(target) => target,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => path.to_owned(),
-        Err(error) => return Err(error),
-    };
-    let existing = std::fs::metadata(&target).ok();
-    if existing.as_ref().is_some_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
-        let mut file = BufWriter::new(File::options().write(true).open(&target)?);
-        return write(&mut file).and_then(|()| file.flush());
-    }
-    let name = target.file_name().filter(|_| !existing.is_some_and(|metadata| metadata.is_dir()));
-    let name = name.ok_or_else(|| io::Error::other("it is a folder, expected a file name"))?;
-    let mut beside_name = std::ffi::OsString::from(".");
-    beside_name.push(name);
-    let count = COUNTER.fetch_add(1, Ordering::Relaxed);
-    beside_name.push(format!(".{}-{count}.part", std::process::id()));
-    let beside = target.with_file_name(beside_name);
-    let file = File::create_new(&beside)?;
-    let mut unfinished = Unfinished(Some(beside.clone()));
-    let mut file = BufWriter::new(file);
-    write(&mut file)?;
-    file.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-    std::fs::rename(&beside, &target)?;
-    unfinished.0 = None;
-    Ok(())
 }
 
 fn check_pixels(width: u32, height: u32, pixels: &[[f32; 3]]) -> io::Result<()> {

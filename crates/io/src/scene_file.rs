@@ -1,60 +1,221 @@
-//! Scene files: what to draw, from where, how large, in JSON.
+//! Scene files: what to draw and how, in JSON.
 //!
 //! ```json
-//! {"input": {"kind": "volume", "file": "engine_256x256x128_uint8.raw"}, "size": [512, 512],
-//!  "background": [0, 0, 0],
+//! {"input": {"file": "engine_256x256x128_uint8.raw"}, "size": [512, 512], "background": [0, 0, 0],
 //!  "camera": {"projection": "perspective", "eye": [470, -190, 330], "target": [127, 127, 63],
 //!             "up": [0, 0, 1], "fov_y_deg": 30},
 //!  "transfer_function": {"points": [{"value": 0, "color": [0, 0, 0], "opacity": 0},
 //!                                   {"value": 255, "color": [1, 1, 1], "opacity": 0.5}],
 //!                        "unit_distance": 1}}
 //! ```
-//! `input` may also have `dims`, `dtype`, `spacing` and `array`; an orthographic camera has `height` in place
-//! of `fov_y_deg`; `name` is optional, and so are opaque surfaces among the data:
-//! `"meshes": [{"file": "hull.obj", "color": [0.8, 0.8, 0.8]}]`. Any other field is an error, so that a slip of the pen is found.
+//! `input` with its `file` is all that a scene needs. What is missing is found as it is without a scene; every field but
+//! the camera means what the option of its name means on the command line. `docs/scene.schema.json` describes every
+//! field. An unknown one is an error, so that a slip of the pen is found.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
-use serde::Deserialize;
-use volery_scene::{Camera, Projection, TransferFunction, camera, transfer};
+use serde::{Deserialize, Serialize};
+use volery_scene::{Camera, TransferFunction, TransferFunction2d};
 
 use crate::bytes::load_text;
-use crate::error::{OneLine, Problem, first_of};
-use crate::layout::{Element, ParseElementError};
-use crate::transfer::TransferJson;
+use crate::error::{OneLine, Problem};
+use crate::layout::Element;
+use crate::out::{WriteError, write_atomically};
 use crate::volume::ReadOptions;
+
+mod camera;
+mod check;
+mod transfer;
+
+pub use camera::serialize_camera;
+pub use check::{MAX_PIXELS, MAX_SIDE, SizeError, check_size};
+pub use transfer::serialize as serialize_transfer;
 
 /// Scene files larger than this are refused.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
-/// The largest width or height of a picture.
-pub const MAX_SIDE: u32 = 1 << 16;
-
-/// The most pixels of a picture.
-pub const MAX_PIXELS: u64 = 1 << 28;
-
-/// A scene: everything that a picture needs.
-#[derive(Clone, Debug, PartialEq)]
+/// A scene: what to draw, and as much of how as somebody said.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SceneFile {
-    /// Its name, or the file's.
-    pub name: String,
+    /// Its name, for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// What is drawn.
     pub input: SceneInput,
     /// Width and height of the picture in pixels.
-    pub size: [u32; 2],
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::size")]
+    pub size: Option<[u32; 2]>,
     /// Linear RGB behind everything, each in [0, 1].
-    pub background: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::background")]
+    pub background: Option<[f64; 3]>,
     /// Where it is seen from; without defects.
-    pub camera: Camera,
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "camera")]
+    pub camera: Option<Camera>,
     /// Colour and opacity of values.
-    pub transfer: TransferFunction,
+    #[serde(
+        default,
+        rename = "transfer_function",
+        skip_serializing_if = "Option::is_none",
+        with = "transfer"
+    )]
+    pub transfer: Option<SceneTransfer>,
+    /// The values over which automatic colours run.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::range")]
+    pub range: Option<[f64; 2]>,
+    /// How to draw.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub technique: Option<SceneTechnique>,
+    /// Largest difference of a value from the full resolution, as a fraction of the value range.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::tolerance")]
+    pub tolerance: Option<f64>,
+    /// Cutting planes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "check::planes")]
+    pub planes: Vec<ScenePlane>,
+    /// Where planes are in full detail.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::focus")]
+    pub focus: Option<SceneFocus>,
+    /// Largest difference of a colour from the full resolution, in [0, 1]; of planes.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::error")]
+    pub error: Option<f64>,
+    /// Whether planes let light through where the transfer function's opacity is below 1.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub transparent: bool,
+    /// Whether planes show the nearest sample in place of interpolating.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub nearest: bool,
+    /// Whether the nodes of planes are outlined.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub show_nodes: bool,
+    /// How fans find the length of a ray in a cube.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<SceneThickness>,
+    /// Planes over the extent of a grid.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::slices")]
+    pub slices: Option<u32>,
+    /// Share of a grid's cells that planes are to meet.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::adaptive")]
+    pub adaptive: Option<f64>,
+    /// Whether a grid is sliced along its axes.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub axes: bool,
+    /// Whether matter of a grid is shaded.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub shade: bool,
+    /// Whether a grid's slices are drawn from few bytes.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub quantized: bool,
+    /// Who draws; missing for whoever is best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub backend: Option<SceneBackend>,
     /// Opaque surfaces among the data.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "check::meshes")]
     pub meshes: Vec<SceneMesh>,
 }
 
-/// An opaque surface of a scene.
+/// The file of a scene and what the scene says about it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneInput {
+    /// Volume or grid; missing where the file says so itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<InputKind>,
+    /// As written: relative to the scene file or the data folder.
+    pub file: PathBuf,
+    /// Samples along x, y, z, for raw files.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::dims")]
+    pub dims: Option<[usize; 3]>,
+    /// Sample type and byte order, for raw files.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::dtype")]
+    pub dtype: Option<Element>,
+    /// World distance of neighbouring samples, in place of the file's.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::spacing")]
+    pub spacing: Option<[f64; 3]>,
+    /// The array to draw.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<String>,
+}
+
+/// Whether the input is a voxel volume or an unstructured grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum InputKind {
+    /// Samples on a regular grid.
+    Volume,
+    /// Cells.
+    Grid,
+}
+
+/// How a scene is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SceneTechnique {
+    /// Rays through matter.
+    Raycast,
+    /// Cutting planes.
+    Plane,
+    /// Cubes of constant value.
+    Fans,
+    /// Slices through cells.
+    Stack,
+}
+
+/// How the length of a ray in a cube is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SceneThickness {
+    /// The exact chord.
+    Exact,
+    /// Linear on the screen.
+    Interpolated,
+}
+
+/// Who draws a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SceneBackend {
+    /// The CPU.
+    Software,
+    /// The best device that wgpu finds.
+    Wgpu,
+}
+
+/// Colour and opacity of values, as a scene gives them.
 #[derive(Clone, Debug, PartialEq)]
+pub enum SceneTransfer {
+    /// Over values.
+    Values(TransferFunction),
+    /// Over values and gradient magnitudes.
+    Magnitudes(TransferFunction2d),
+    /// By name, for the program to know.
+    Preset(String),
+}
+
+/// All points x with `normal` . x = `distance`, in world units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScenePlane {
+    /// Of any length above 0.
+    pub normal: [f64; 3],
+    /// The right side of the equation.
+    pub distance: f64,
+}
+
+/// Where planes are in full detail.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFocus {
+    /// World position.
+    pub point: [f64; 3],
+    /// A node is drawn where its centre is farther than so many of its diagonals.
+    #[serde(default = "usual_quality")]
+    pub quality: f64,
+}
+
+/// An opaque surface of a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SceneMesh {
     /// As written: relative to the scene file or the data folder, for [`read_mesh`](crate::read_mesh).
     pub file: PathBuf,
@@ -62,38 +223,21 @@ pub struct SceneMesh {
     pub color: [f64; 3],
 }
 
-/// Whether the input is a voxel volume or an unstructured grid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum InputKind {
-    /// Samples on a regular grid.
-    Volume,
-    /// Cells; parsed, so that the caller can say whether it draws them.
-    Grid,
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
-/// The file of a scene and what the scene says about it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SceneInput {
-    /// Volume or grid.
-    pub kind: InputKind,
-    /// As written: relative to the scene file or the data folder.
-    pub file: PathBuf,
-    /// Samples along x, y, z, for raw files.
-    pub dims: Option<[usize; 3]>,
-    /// Sample type and byte order, for raw files.
-    pub element: Option<Element>,
-    /// World distance of neighbouring samples.
-    pub spacing: Option<DVec3>,
-    /// The array to draw.
-    pub array: Option<String>,
+fn usual_quality() -> f64 {
+    1.0
 }
 
 impl SceneInput {
     /// How to read the file with [`read_volume`](crate::read_volume).
     pub fn read_options(&self) -> ReadOptions {
-        let Self { kind: _, file: _, dims, element, spacing, array } = self.clone();
-        ReadOptions { dims, element, spacing, array, ..ReadOptions::default() }
+        let Self { kind: _, file: _, dims, dtype, spacing, array } = self.clone();
+        let spacing = spacing.map(glam::DVec3::from_array);
+        ReadOptions { dims, element: dtype, spacing, array, ..ReadOptions::default() }
     }
 }
 
@@ -113,101 +257,9 @@ pub enum SceneProblem {
     /// The file itself.
     #[error("{0}")]
     File(Problem),
-    /// It is no JSON, a field is missing, has the wrong type or is unknown.
+    /// It is no JSON, or a field is missing, unknown, of the wrong type, or has a value that makes no sense.
     #[error("{0}")]
     Json(String),
-    /// The picture's size.
-    #[error("size is {} x {}, expected 1 to {MAX_SIDE} each and at most {MAX_PIXELS} pixels", .found[0], .found[1])]
-    Size {
-        /// Width and height as given.
-        found: [u32; 2],
-    },
-    /// The background is no colour.
-    #[error("background is {found:?}, expected three numbers in [0, 1]")]
-    Background {
-        /// As given.
-        found: [f64; 3],
-    },
-    /// The colour of a mesh is none.
-    #[error("meshes[{index}].color is {found:?}, expected three numbers in [0, 1]")]
-    MeshColor {
-        /// Place of the mesh in the list.
-        index: usize,
-        /// As given.
-        found: [f64; 3],
-    },
-    /// The spacing.
-    #[error("input.spacing is {found:?}, expected three positive finite numbers")]
-    Spacing {
-        /// As given.
-        found: [f64; 3],
-    },
-    /// The sample type is unknown.
-    #[error("input.{0}")]
-    Dtype(ParseElementError),
-    /// The projection lacks its measure, or has the other's.
-    #[error("camera.{found}, expected {expected}")]
-    Projection {
-        /// What there is.
-        found: &'static str,
-        /// What would be right.
-        expected: &'static str,
-    },
-    /// The camera cannot take a picture: its first defect.
-    #[error("{0}")]
-    Camera(camera::Defect),
-    /// The transfer function is not meaningful.
-    #[error("transfer function: {}", first_of(&.0.defects))]
-    Transfer(transfer::Error),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SceneJson {
-    name: Option<String>,
-    input: InputJson,
-    size: [u32; 2],
-    background: [f64; 3],
-    camera: CameraJson,
-    transfer_function: TransferJson,
-    #[serde(default)]
-    meshes: Vec<MeshJson>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MeshJson {
-    file: PathBuf,
-    color: [f64; 3],
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct InputJson {
-    kind: InputKind,
-    file: PathBuf,
-    dims: Option<[usize; 3]>,
-    dtype: Option<String>,
-    spacing: Option<[f64; 3]>,
-    array: Option<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CameraJson {
-    projection: ProjectionName,
-    eye: [f64; 3],
-    target: [f64; 3],
-    up: [f64; 3],
-    fov_y_deg: Option<f64>,
-    height: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum ProjectionName {
-    Perspective,
-    Orthographic,
 }
 
 impl SceneFile {
@@ -218,91 +270,24 @@ impl SceneFile {
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let fail = |problem| SceneError { path: path.to_owned(), problem };
         let text = load_text(path, MAX_FILE_BYTES).map_err(|problem| fail(SceneProblem::File(problem)))?;
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        Self::parse(&text, &name).map_err(fail)
+        Self::parse(&text).map_err(fail)
     }
 
-    /// Parses the text of a scene file; `name` is used where it has none.
+    /// Parses the text of a scene file.
     ///
     /// # Errors
     /// As [`SceneFile::read`].
-    pub fn parse(text: &str, name: &str) -> Result<Self, SceneProblem> {
-        let json: SceneJson =
-            serde_json::from_str(text).map_err(|error| SceneProblem::Json(OneLine(error).to_string()))?;
-        let SceneJson { name: own_name, input, size, background, camera, transfer_function, meshes } = json;
-        check_size(size)?;
-        if !is_color(background) {
-            return Err(SceneProblem::Background { found: background });
-        }
-        let mesh = |(index, MeshJson { file, color })| match color {
-            found if !is_color(found) => Err(SceneProblem::MeshColor { index, found }),
-            color => Ok(SceneMesh { file, color }),
-        };
-        Ok(Self {
-            name: own_name.unwrap_or_else(|| name.to_owned()),
-            input: input.validated()?,
-            size,
-            background,
-            camera: camera.validated()?,
-            transfer: transfer_function.validated().map_err(SceneProblem::Transfer)?,
-            meshes: meshes.into_iter().enumerate().map(mesh).collect::<Result<_, _>>()?,
-        })
+    pub fn parse(text: &str) -> Result<Self, SceneProblem> {
+        serde_json::from_str(text).map_err(|error| SceneProblem::Json(OneLine(error).to_string()))
     }
-}
 
-fn is_color(color: [f64; 3]) -> bool {
-    color.iter().all(|channel| (0.0..=1.0).contains(channel))
-}
-
-/// Checks the size of a picture, from a scene or elsewhere.
-///
-/// # Errors
-/// [`SceneProblem::Size`] when a side is 0 or above [`MAX_SIDE`], or there are more than [`MAX_PIXELS`].
-pub fn check_size(size: [u32; 2]) -> Result<(), SceneProblem> {
-    let [width, height] = size.map(u64::from);
-    let sides = size.iter().all(|side| (1..=MAX_SIDE).contains(side));
-    if sides && width * height <= MAX_PIXELS { Ok(()) } else { Err(SceneProblem::Size { found: size }) }
-}
-
-impl InputJson {
-    fn validated(self) -> Result<SceneInput, SceneProblem> {
-        let Self { kind, file, dims, dtype, spacing, array } = self;
-        if let Some(found) = spacing
-            && !found.iter().all(|&distance| distance > 0.0 && distance.is_finite())
-        {
-            return Err(SceneProblem::Spacing { found });
-        }
-        let element = dtype.map(|dtype| dtype.parse()).transpose().map_err(SceneProblem::Dtype)?;
-        Ok(SceneInput { kind, file, dims, element, spacing: spacing.map(DVec3::from_array), array })
-    }
-}
-
-impl CameraJson {
-    fn validated(self) -> Result<Camera, SceneProblem> {
-        let projection = match (self.projection, self.fov_y_deg, self.height) {
-            (ProjectionName::Perspective, Some(fov_y_deg), None) => Projection::Perspective { fov_y_deg },
-            (ProjectionName::Orthographic, None, Some(height)) => Projection::Orthographic { height },
-            (ProjectionName::Perspective, None, _) => {
-                let expected = "the full vertical angle of a perspective camera";
-                return Err(SceneProblem::Projection { found: "fov_y_deg is missing", expected });
-            }
-            (ProjectionName::Orthographic, _, None) => {
-                let expected = "the height of an orthographic picture in world units";
-                return Err(SceneProblem::Projection { found: "height is missing", expected });
-            }
-            (_, Some(_), Some(_)) => {
-                let expected = "fov_y_deg in perspective or height in an orthographic camera";
-                return Err(SceneProblem::Projection {
-                    found: "fov_y_deg and height are both there",
-                    expected,
-                });
-            }
-        };
-        let [eye, target, up] = [self.eye, self.target, self.up].map(DVec3::from_array);
-        let camera = Camera { eye, target, up, projection };
-        match camera.defects().into_iter().next() {
-            None => Ok(camera),
-            Some(defect) => Err(SceneProblem::Camera(defect)),
-        }
+    /// Writes a scene file; [`SceneFile::read`] brings it back bit for bit.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or names a file whose name is not UTF-8, which JSON cannot hold.
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|source| WriteError { path: path.to_owned(), source: std::io::Error::other(source) })?;
+        write_atomically(path, |file| writeln!(file, "{text}"))
     }
 }

@@ -20,7 +20,7 @@ mod json;
 
 pub use color::ColorSpace;
 pub use color_map::{ColorMap, MAX_COLOR_ERROR, OpacityPoint};
-pub(crate) use json::TransferJson;
+pub(crate) use json::{Transfer2dJson, TransferJson};
 pub use json::{Transfer2dProblem, read_transfer_2d, write_transfer, write_transfer_2d};
 
 /// Transfer function files larger than this are refused.
@@ -44,6 +44,8 @@ pub struct NamedTransfer {
     pub name: String,
     /// The function.
     pub transfer: TransferFunction,
+    /// Whether it goes over [`TransferOptions::range`]; our own JSON has values of its own.
+    pub is_stretched: bool,
 }
 
 /// A file that could not be read as a transfer function.
@@ -106,14 +108,16 @@ pub fn read_transfer(path: &Path, options: &TransferOptions) -> Result<NamedTran
         if value.get("points").is_some() {
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let transfer = TransferJson::deserialize(value).map_err(json_problem)?.validated();
-            return Ok(NamedTransfer { name, transfer: transfer.map_err(TransferProblem::Defects)? });
+            let transfer = transfer.map_err(TransferProblem::Defects)?;
+            return Ok(NamedTransfer { name, transfer, is_stretched: false });
         }
         if value.get("magnitudes").is_some() {
             return Err(TransferProblem::HasMagnitudes);
         }
         let map = choose(color_maps(&value)?, options.map)?;
         let transfer = map.transfer_function(options.range, options.unit_distance);
-        Ok(NamedTransfer { transfer: transfer.map_err(TransferProblem::Defects)?, name: map.name })
+        let transfer = transfer.map_err(TransferProblem::Defects)?;
+        Ok(NamedTransfer { transfer, name: map.name, is_stretched: options.range.is_some() })
     };
     read().map_err(|problem| TransferError { path: path.to_owned(), problem })
 }

@@ -22,6 +22,17 @@ pub enum BackendChoice {
     Wgpu,
 }
 
+impl BackendChoice {
+    /// Whether to open it loads drivers, which may talk.
+    pub fn loads_drivers(self) -> bool {
+        match self {
+            Self::Auto => may_have_gpu(),
+            Self::Software => false,
+            Self::Wgpu => true,
+        }
+    }
+}
+
 /// Why a backend could not be had.
 #[derive(Debug, thiserror::Error)]
 #[error("backend wgpu: {0}")]

@@ -18,7 +18,6 @@ use volery_reference::GridTracer;
 use volery_scene::{CellType, Samples, TransferFunction, UnstructuredGrid};
 use volery_slicing::{Slicer, node_gradients};
 
-use crate::histogram::Histogram;
 use crate::report;
 use crate::session::{Picture, RenderError, VerifyError, View, ViewOptions};
 #[cfg(doc)]
@@ -110,17 +109,22 @@ impl GridSession {
     /// A view of the whole grid: the camera as near as it can be, the transfer function [`Preset::Auto`] where
     /// [`ViewOptions`] has none.
     pub fn view(&self, options: &ViewOptions) -> View {
-        stack::view(self.shape.world_bounds, options, || self.preset(Preset::Auto))
+        stack::view(self.shape.world_bounds, options, || self.preset_over(Preset::Auto, options.range))
     }
 
     /// The transfer function of a preset for this grid, from the values at the nodes of cells that hold matter.
+    pub fn preset(&self, preset: Preset) -> TransferFunction {
+        self.preset_over(preset, None)
+    }
+
+    /// The same over a range of values, in place of those that are worth colours.
     ///
     /// # Panics
-    /// Never: a session's grid has a histogram.
-    pub fn preset(&self, preset: Preset) -> TransferFunction {
+    /// Never: opening found finite values and their range.
+    pub fn preset_over(&self, preset: Preset, range: Option<[f64; 2]>) -> TransferFunction {
         let used = values::of_used_nodes(self.shape.slicer.grid(), &self.values);
-        let histogram = Histogram::of_samples(&used, 0).expect("opening found finite values and their range");
-        preset.transfer(&histogram, self.extent())
+        let transfer = preset.over(&used, range, self.extent());
+        transfer.expect("opening found finite values and their range")
     }
 
     /// Draws one picture. What an earlier picture sliced is used again where it is what this one needs.

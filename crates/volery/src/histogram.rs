@@ -3,9 +3,14 @@
 //! # Method
 //! Whole-numbered data of few values have one bin per value, the value in the middle of its bin; all other
 //! data have [`MAX_BINS`] bins over the range of their finite values. Blank samples are counted apart.
+//!
+//! [`Histogram::of_matter`] is for automatic colours. It leaves out what stands for no data, and then makes bins over
+//! most of the values alone, as often as outliers would leave few bins to the rest; see the module `matter`.
 
 use rayon::prelude::*;
 use volery_scene::{Sample, SampleType, Samples, VoxelGrid, for_samples};
+
+mod matter;
 
 /// Most bins of a histogram.
 pub const MAX_BINS: usize = 1024;
@@ -16,7 +21,7 @@ const CHUNK: usize = 1 << 20;
 /// Counts of the values of one channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
-    /// Smallest and largest finite value.
+    /// Smallest and largest finite value; of [`Histogram::within`] the values that bins go over.
     pub range: [f64; 2],
     /// Value at the lower edge of the first bin.
     pub start: f64,
@@ -24,8 +29,19 @@ pub struct Histogram {
     pub bin_width: f64,
     /// Samples in each bin.
     pub counts: Vec<u64>,
-    /// Samples that are NaN or infinite, in no bin.
+    /// Samples that are NaN or infinite, in no bin; of [`Histogram::of_matter`] those too that stand for no data.
     pub blank: u64,
+    /// Values below or above stand for no data.
+    pub counted: [f64; 2],
+}
+
+/// Which values have which bins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Window {
+    /// The values that bins go over; those outside count in the end bins.
+    range: [f64; 2],
+    /// Values below or above are blank.
+    counted: [f64; 2],
 }
 
 impl Histogram {
@@ -42,7 +58,20 @@ impl Histogram {
     /// # Panics
     /// When the samples have no such channel.
     pub fn of_samples(samples: &Samples, channel: usize) -> Option<Self> {
-        let [low, high] = samples.range(channel)?;
+        Self::of_window(samples, channel, Window::of(samples.range(channel)?))
+    }
+
+    /// As [`Histogram::of_samples`], with bins over a range of values; those outside count in the end bins.
+    ///
+    /// # Panics
+    /// When the samples have no such channel.
+    pub fn within(samples: &Samples, channel: usize, range: [f64; 2]) -> Option<Self> {
+        samples.range(channel)?;
+        Self::of_window(samples, channel, Window::of(range))
+    }
+
+    fn of_window(samples: &Samples, channel: usize, window: Window) -> Option<Self> {
+        let [low, high] = window.range;
         let width = high - low;
         if !width.is_finite() {
             return None;
@@ -57,8 +86,14 @@ impl Histogram {
         } else {
             (low - 0.5, 1.0, 1)
         };
-        let mut histogram =
-            Self { range: [low, high], start, bin_width, counts: vec![0; num_bins], blank: 0 };
+        let mut histogram = Self {
+            range: [low, high],
+            start,
+            bin_width,
+            counts: vec![0; num_bins],
+            blank: 0,
+            counted: window.counted,
+        };
         let counted = for_samples!(samples, |values| histogram.count(values, channel));
         histogram.blank = counted.iter().map(|(_, blank)| blank).sum();
         for (counts, _) in counted {
@@ -68,14 +103,16 @@ impl Histogram {
     }
 
     fn count<T: Sample>(&self, values: &[T], channel: usize) -> Vec<(Vec<u64>, u64)> {
+        let [floor, ceiling] = self.counted;
         let threads = rayon::current_num_threads().max(1);
         let chunk = values.len().div_ceil(threads).max(CHUNK);
         let count_chunk = |chunk: &[T]| {
             let (mut counts, mut blank) = (vec![0; self.counts.len()], 0);
             for value in chunk {
-                match self.bin(value.channel(channel)) {
-                    Some(bin) => counts[bin] += 1,
-                    None => blank += 1,
+                let value = value.channel(channel);
+                match self.bin(value) {
+                    Some(bin) if (floor..=ceiling).contains(&value) => counts[bin] += 1,
+                    _ => blank += 1,
                 }
             }
             (counts, blank)
@@ -109,6 +146,12 @@ impl Histogram {
             coarse[(2 * bin + 1) * num_bins / (2 * self.counts.len())] += count;
         }
         coarse
+    }
+}
+
+impl Window {
+    fn of(range: [f64; 2]) -> Self {
+        Self { range, counted: [f64::NEG_INFINITY, f64::INFINITY] }
     }
 }
 

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use volery_io::mesh::MAX_MESH_BYTES;
-use volery_io::scene_file::{InputKind, SceneError, SceneMesh};
-use volery_io::{GridFile, GridOptions, ReadError, ReadOptions, SceneFile, Volume};
-use volery_io::{is_grid, read_grid, read_mesh, read_stack, read_volume};
+use volery_io::scene_file::{InputKind, SceneError, SceneInput, SceneMesh};
+use volery_io::{GridFile, GridOptions, OpenedFile, ReadError, SceneFile, Volume};
+use volery_io::{is_grid, read_grid, read_mesh, read_stack, read_volume, recording_files};
 use volery_scene::TriangleMesh;
 use volery_slicing::QuantizedMesh;
 
@@ -25,6 +25,8 @@ pub struct Input {
     pub scene: Option<SceneFile>,
     /// The opaque surfaces of the scene, for [`View::meshes`](crate::View::meshes).
     pub meshes: Arc<[TriangleMesh]>,
+    /// Every file that was opened for it.
+    pub files: Vec<OpenedFile>,
     /// Seconds of reading and decoding.
     pub load_seconds: f64,
 }
@@ -38,6 +40,17 @@ pub enum InputData {
     Grid(GridFile),
     /// Slices.
     Stack(QuantizedMesh),
+}
+
+impl InputData {
+    /// What it is, for people.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Volume(_) => "a volume",
+            Self::Grid(_) => "an unstructured grid",
+            Self::Stack(_) => "a stack of slices",
+        }
+    }
 }
 
 /// Why an input could not be read.
@@ -57,15 +70,27 @@ pub enum InputError {
         /// What it is.
         found: &'static str,
     },
+    /// The file has nothing that the option could choose or change.
+    #[error("{}: is {found}, expected {expected} for {option}", .path.display().to_string().escape_debug())]
+    Unread {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        found: String,
+        /// What has what the option asks for.
+        expected: &'static str,
+        /// The option, as on the command line.
+        option: &'static str,
+    },
 }
 
-/// How to read an input.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct InputOptions<'a> {
+/// How to read an input: what is given goes before what a scene says.
+#[derive(Clone, Debug, Default)]
+pub struct InputOptions {
     /// Folder that paths in a scene are relative to; else that of the scene file.
-    pub data_dir: Option<&'a Path>,
-    /// The array to read, in place of the scene's or the file's own.
-    pub array: Option<&'a str>,
+    pub data_dir: Option<PathBuf>,
+    /// What the caller knows of the file or wants of it; [`SceneInput::file`] is not read.
+    pub input: SceneInput,
 }
 
 /// Reads a scene file (its name ends in `.json`) and its volume or grid, or one of these alone. Paths in a scene are
@@ -74,50 +99,137 @@ pub struct InputOptions<'a> {
 /// # Errors
 /// When a file cannot be read.
 pub fn read_input(path: &Path, data_dir: Option<&Path>) -> Result<Input, InputError> {
-    InputOptions { data_dir, array: None }.read(path)
+    let data_dir = data_dir.map(Path::to_owned);
+    InputOptions { data_dir, ..InputOptions::default() }.find(path)?.read()
 }
 
-impl InputOptions<'_> {
-    /// As [`read_input`].
+/// What an input consists of, before its data are read.
+#[derive(Clone, Debug)]
+pub struct InputPlan {
+    /// The scene file, if there is one.
+    pub scene_path: Option<PathBuf>,
+    /// What the scene file says.
+    pub scene: Option<SceneFile>,
+    /// The file of the data and how to read it: options and scene together.
+    pub input: SceneInput,
+    /// The opaque surfaces of the scene.
+    pub meshes: Vec<SceneMesh>,
+}
+
+impl InputOptions {
+    /// Reads the scene file, if `path` is one (its name ends in `.json`), and says which files the input is of.
     ///
     /// # Errors
-    /// When a file cannot be read.
-    pub fn read(&self, path: &Path) -> Result<Input, InputError> {
-        let start = Instant::now();
+    /// When the scene file cannot be read.
+    pub fn find(&self, path: &Path) -> Result<InputPlan, InputError> {
         let is_scene = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
-        let mut notes = Vec::new();
-        let (path, scene, meshes) = if is_scene {
-            let scene = SceneFile::read(path)?;
-            let folder = self.data_dir.unwrap_or_else(|| path.parent().unwrap_or(Path::new("")));
-            let meshes = read_meshes(&scene, folder, &mut notes)?;
-            (folder.join(&scene.input.file), Some(scene), meshes)
-        } else {
-            (path.to_owned(), None, [].into())
-        };
-        let is_stack = scene.is_none() && is_stack(&path);
-        let has_cells = match &scene {
-            Some(scene) => scene.input.kind == InputKind::Grid,
-            None => path.is_file() && is_grid(&path),
-        };
-        let array = || self.array.map(str::to_owned);
-        let mut data = if is_stack {
-            InputData::Stack(read_stack(&path, MAX_STACK_BYTES)?)
-        } else if has_cells {
-            let array = array().or_else(|| scene.as_ref()?.input.array.clone());
-            InputData::Grid(read_grid(&path, &GridOptions { array, ..GridOptions::default() })?)
-        } else {
-            let mut options =
-                scene.as_ref().map_or_else(ReadOptions::default, |scene| scene.input.read_options());
-            options.array = array().or(options.array);
-            InputData::Volume(read_volume(&path, &options)?)
-        };
-        match &mut data {
-            InputData::Volume(volume) => volume.notes.extend(notes),
-            InputData::Grid(file) => file.notes.extend(notes),
-            // No scene has one.
-            InputData::Stack(_) => {}
+        let own = self.input.clone();
+        if !is_scene {
+            let input = SceneInput { file: path.to_owned(), ..own };
+            return Ok(InputPlan { scene_path: None, scene: None, input, meshes: Vec::new() });
         }
-        Ok(Input { path, data, scene, meshes, load_seconds: start.elapsed().as_secs_f64() })
+        let scene = SceneFile::read(path)?;
+        let folder = self.data_dir.as_deref().unwrap_or_else(|| path.parent().unwrap_or(Path::new("")));
+        let SceneInput { kind, file, dims, dtype, spacing, array } = scene.input.clone();
+        let input = SceneInput {
+            kind: own.kind.or(kind),
+            file: folder.join(file),
+            dims: own.dims.or(dims),
+            dtype: own.dtype.or(dtype),
+            spacing: own.spacing.or(spacing),
+            array: own.array.or(array),
+        };
+        let mesh = |mesh: &SceneMesh| SceneMesh { file: folder.join(&mesh.file), color: mesh.color };
+        let meshes = scene.meshes.iter().map(mesh).collect();
+        Ok(InputPlan { scene_path: Some(path.to_owned()), scene: Some(scene), input, meshes })
+    }
+}
+
+impl InputPlan {
+    /// The files that are known before any data are read: those that data files name are in [`Input::files`].
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let meshes = self.meshes.iter().map(|mesh| mesh.file.as_path());
+        self.scene_path.iter().map(PathBuf::as_path).chain([self.input.file.as_path()]).chain(meshes)
+    }
+
+    /// Reads the data.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or has nothing that an option asks for.
+    pub fn read(&self) -> Result<Input, InputError> {
+        let start = Instant::now();
+        let (read, mut files) = recording_files(|| {
+            let mut notes = Vec::new();
+            let meshes = self.read_meshes(&mut notes)?;
+            Ok::<_, InputError>((self.read_data(notes)?, meshes))
+        });
+        let (data, meshes) = read?;
+        if let Some(scene) = &self.scene_path {
+            let bytes = std::fs::metadata(scene).map_or(0, |metadata| metadata.len());
+            files.insert(0, OpenedFile { path: scene.clone(), bytes });
+        }
+        let (path, scene) = (self.input.file.clone(), self.scene.clone());
+        Ok(Input { path, data, scene, meshes, files, load_seconds: start.elapsed().as_secs_f64() })
+    }
+
+    fn read_data(&self, mesh_notes: Vec<String>) -> Result<InputData, InputError> {
+        let SceneInput { kind, file: path, array, .. } = &self.input;
+        let data = match kind {
+            None if is_stack(path) => {
+                self.refuse_unread(&[], "a stack of slices")?;
+                return Ok(InputData::Stack(read_stack(path, MAX_STACK_BYTES)?));
+            }
+            Some(InputKind::Volume) => self.read_volume(mesh_notes)?,
+            None if !path.is_file() || !is_grid(path) => self.read_volume(mesh_notes)?,
+            _ => {
+                self.refuse_unread(&["--array"], "an unstructured grid")?;
+                let options = GridOptions { array: array.clone(), ..GridOptions::default() };
+                let mut file = read_grid(path, &options)?;
+                file.notes.extend(mesh_notes);
+                InputData::Grid(file)
+            }
+        };
+        Ok(data)
+    }
+
+    fn read_volume(&self, mesh_notes: Vec<String>) -> Result<InputData, InputError> {
+        let mut volume = read_volume(&self.input.file, &self.input.read_options())?;
+        if self.input.array.is_some() && volume.array.is_none() {
+            let found = format!("a volume, {}", volume.format);
+            return Err(self.unread("--array", &found, "a file whose format names arrays"));
+        }
+        volume.notes.extend(mesh_notes);
+        Ok(InputData::Volume(volume))
+    }
+
+    /// Refuses options but for those that such a file reads.
+    fn refuse_unread(&self, read: &[&str], found: &str) -> Result<(), InputError> {
+        let SceneInput { kind: _, file: _, dims, dtype, spacing, array } = &self.input;
+        let given = [
+            ("--dims", dims.is_some(), "a volume"),
+            ("--dtype", dtype.is_some(), "a volume"),
+            ("--spacing", spacing.is_some(), "a volume"),
+            ("--array", array.is_some(), "a file whose format names arrays"),
+        ];
+        match given.into_iter().find(|(option, is_given, _)| *is_given && !read.contains(option)) {
+            None => Ok(()),
+            Some((option, _, expected)) => Err(self.unread(option, found, expected)),
+        }
+    }
+
+    fn unread(&self, option: &'static str, found: &str, expected: &'static str) -> InputError {
+        InputError::Unread { path: self.input.file.clone(), found: found.to_owned(), expected, option }
+    }
+
+    /// The meshes of a scene; what their reader left out is added to the notes.
+    fn read_meshes(&self, notes: &mut Vec<String>) -> Result<Arc<[TriangleMesh]>, ReadError> {
+        let names = self.scene.iter().flat_map(|scene| &scene.meshes).map(|mesh| mesh.file.display());
+        let read = |(mesh, name): (&SceneMesh, std::path::Display)| {
+            let file = read_mesh(&mesh.file, mesh.color, MAX_MESH_BYTES)?;
+            notes.extend(file.notes.iter().map(|note| format!("{name}: {note}")));
+            Ok(file.mesh)
+        };
+        self.meshes.iter().zip(names).map(read).collect()
     }
 }
 
@@ -127,34 +239,15 @@ fn is_stack(path: &Path) -> bool {
         .is_some_and(|ending| ["vsl", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
-/// The meshes of a scene; what their reader left out is added to the notes.
-fn read_meshes(
-    scene: &SceneFile,
-    folder: &Path,
-    notes: &mut Vec<String>,
-) -> Result<Arc<[TriangleMesh]>, ReadError> {
-    let read = |mesh: &SceneMesh| {
-        let file = read_mesh(&folder.join(&mesh.file), mesh.color, MAX_MESH_BYTES)?;
-        notes.extend(file.notes.iter().map(|note| format!("{}: {note}", mesh.file.display())));
-        Ok(file.mesh)
-    };
-    scene.meshes.iter().map(read).collect()
-}
-
 impl Input {
     /// The samples.
     ///
     /// # Errors
-    /// When there are cells.
+    /// When there are cells or slices.
     pub fn volume(&self) -> Result<&Volume, InputError> {
         match &self.data {
             InputData::Volume(volume) => Ok(volume),
-            InputData::Grid(_) => {
-                Err(InputError::NoVolume { path: self.path.clone(), found: "an unstructured grid" })
-            }
-            InputData::Stack(_) => {
-                Err(InputError::NoVolume { path: self.path.clone(), found: "a stack of slices" })
-            }
+            other => Err(InputError::NoVolume { path: self.path.clone(), found: other.kind() }),
         }
     }
 

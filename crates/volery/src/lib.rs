@@ -43,7 +43,7 @@ pub use grid_session::{
 };
 pub use histogram::Histogram;
 pub use info::{GridInfo, Info, StackInfo};
-pub use input::{Input, InputData, InputError, InputOptions, read_input};
+pub use input::{Input, InputData, InputError, InputOptions, InputPlan, read_input};
 pub use report::Report;
 pub use session::{
     BACKGROUND, Focus, OpenError, Picture, PlaneView, Progressive, Refinements, RenderError, Session, Step,

@@ -6,14 +6,24 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use volery_frame::{Device, DeviceKind};
+use volery_io::OpenedFile;
+use volery_io::scene_file::{SceneTransfer, serialize_camera, serialize_transfer};
+use volery_scene::Camera;
+
+use crate::session::View;
 
 pub use crate::ray_budget::RayBudget;
 
 /// Everything about one picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
+    /// Of the library that drew.
+    pub version: &'static str,
     /// What was drawn.
     pub input: Input,
+    /// Every file that was read for it; missing for what came from memory.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<InputFile>,
     /// How: `raycast`, `plane`, `fans`, `stack`.
     pub technique: &'static str,
     /// Of fans, how lengths in cubes were found: `exact` or `interpolated`.
@@ -23,6 +33,12 @@ pub struct Report {
     pub backend: Backend,
     /// Size of the picture.
     pub image: ImageSize,
+    /// Where it was seen from, as a scene file has it.
+    #[serde(serialize_with = "serialize_camera")]
+    pub camera: Camera,
+    /// Colour and opacity of values, as a scene file has them; missing where samples are colours.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "serialize_transfer")]
+    pub transfer_function: Option<SceneTransfer>,
     /// Where the time went.
     pub seconds: Seconds,
     /// Every frame, in order.
@@ -53,6 +69,21 @@ pub struct Input {
     pub cells: Option<BTreeMap<&'static str, usize>>,
     /// Type of a sample: `u8`, `f32`, ...
     pub scalar: &'static str,
+}
+
+/// A file that was read.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct InputFile {
+    /// Where it is.
+    pub path: String,
+    /// Its size.
+    pub bytes: u64,
+}
+
+impl From<&OpenedFile> for InputFile {
+    fn from(OpenedFile { path, bytes }: &OpenedFile) -> Self {
+        Self { path: path.to_string_lossy().into_owned(), bytes: *bytes }
+    }
 }
 
 /// Who drew.
@@ -186,6 +217,17 @@ impl Backend {
         Self { kind, device: device.name }
     }
 }
+
+/// The transfer function of a view, as a scene has it.
+pub(crate) fn transfer_of(view: &View) -> SceneTransfer {
+    match &view.stack.classification {
+        Some(function) => SceneTransfer::Magnitudes(function.as_ref().clone()),
+        None => SceneTransfer::Values(view.transfer.clone()),
+    }
+}
+
+/// The version of this library.
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 impl Report {
     /// The report as the JSON text that `--report` writes.

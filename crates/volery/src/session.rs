@@ -175,12 +175,12 @@ impl Session {
     /// A view of everything that is visible, in full resolution: the camera as near as it can be, planes and
     /// transfer function as [`ViewOptions`] says where it has none.
     pub fn view(&self, options: &ViewOptions) -> View {
-        let ViewOptions { width, height, direction, orthographic, transfer, mut planes, stack } =
+        let ViewOptions { width, height, direction, orthographic, transfer, range, mut planes, stack } =
             options.clone();
         let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
         let (camera, transfer) = match self.technique {
             Technique::Raycast | Technique::Fans => {
-                let transfer = transfer.unwrap_or_else(|| self.preset(Preset::Auto));
+                let transfer = transfer.unwrap_or_else(|| self.preset_over(Preset::Auto, range));
                 let blocks = fit::visible_blocks(&self.source, &transfer);
                 (fit::camera(&blocks, direction.unwrap_or_default(), orthographic, aspect), transfer)
             }
@@ -188,8 +188,12 @@ impl Session {
                 if planes.planes.is_empty() {
                     planes.planes = plane::middle_planes(&self.grid);
                 }
-                let transfer =
-                    transfer.unwrap_or_else(|| transfer::gray(self.value_range(), self.grid.extent()));
+                let shown = || {
+                    let is_color = self.grid.sample_type().channels() > 1;
+                    let matter = (!is_color).then(|| Histogram::of_matter(self.grid.samples(), 0)).flatten();
+                    range.unwrap_or(matter.map_or(self.value_range(), |histogram| histogram.range))
+                };
+                let transfer = transfer.unwrap_or_else(|| transfer::gray(shown(), self.grid.extent()));
                 let camera =
                     plane::camera(self.source.layout(), &planes.planes, direction, orthographic, aspect);
                 (camera, transfer)
@@ -210,12 +214,17 @@ impl Session {
     }
 
     /// The transfer function of a preset for this volume; of colours, for their first channel.
+    pub fn preset(&self, preset: Preset) -> TransferFunction {
+        self.preset_over(preset, None)
+    }
+
+    /// The same over a range of values, in place of those that are worth colours.
     ///
     /// # Panics
-    /// Never: a session's volume has a histogram.
-    pub fn preset(&self, preset: Preset) -> TransferFunction {
-        let histogram = Histogram::of(&self.grid, 0).expect("opening found finite values and their range");
-        preset.transfer(&histogram, self.grid.extent())
+    /// Never: opening found finite values and their range.
+    pub fn preset_over(&self, preset: Preset, range: Option<[f64; 2]>) -> TransferFunction {
+        let transfer = preset.over(self.grid.samples(), range, self.grid.extent());
+        transfer.expect("opening found finite values and their range")
     }
 
     /// Draws one picture.

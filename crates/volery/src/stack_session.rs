@@ -8,7 +8,6 @@ use volery_scene::{Samples, TransferFunction};
 use volery_slicing::QuantizedMesh;
 
 use crate::fit::Direction;
-use crate::histogram::Histogram;
 use crate::report;
 use crate::session::{Picture, RenderError, View, ViewOptions};
 use crate::technique::stack::{self, Frames, Stack, Tabulated};
@@ -71,16 +70,20 @@ impl StackSession {
     pub fn view(&self, options: &ViewOptions) -> View {
         let direction = options.direction.unwrap_or_else(|| Direction::facing(self.stack.normal()));
         let options = ViewOptions { direction: Some(direction), ..options.clone() };
-        stack::view(self.world_bounds, &options, || self.preset(Preset::Auto))
+        stack::view(self.world_bounds, &options, || self.preset_over(Preset::Auto, options.range))
     }
 
     /// The transfer function of a preset, from the values at the vertices.
+    pub fn preset(&self, preset: Preset) -> TransferFunction {
+        self.preset_over(preset, None)
+    }
+
+    /// The same over a range of values, in place of those that are worth colours.
     ///
     /// # Panics
-    /// Never: a session's vertices have a histogram.
-    pub fn preset(&self, preset: Preset) -> TransferFunction {
-        let histogram = Histogram::of_samples(&values(&self.stack), 0);
-        preset.transfer(&histogram.expect("opening found finite values"), self.extent())
+    /// Never: opening found finite values.
+    pub fn preset_over(&self, preset: Preset, range: Option<[f64; 2]>) -> TransferFunction {
+        preset.over(&values(&self.stack), range, self.extent()).expect("opening found finite values")
     }
 
     /// Draws the same picture `num_frames` times and reports the time of each.

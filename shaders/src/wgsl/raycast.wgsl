@@ -619,7 +619,7 @@ fn light_along(ray: Ray) -> Light {
         end = b.end;
         end_level = select(NO_LEVEL, level, is_matter);
 
-        let inside = clamp(floor(ray.start + t_next * ray.direction), low, high - 1.0);
+        let inside = clamp(floor(ray.start + t_next * ray.direction), low, min(high, frame.cells) - 1.0);
         let beyond = mix(low - 1.0, high, ray.rising);
         place = select(select(inside, beyond, faces <= vec3f(t_next)), place, vec3<bool>(is_start));
         t = t_next;

@@ -12,10 +12,11 @@ pub(crate) fn draw(input: &Input, count: usize) -> Result<Image, Box<dyn Error>>
     let (InputData::Grid(file), Some(scene)) = (&input.data, &input.scene) else {
         return Err("expected a scene of a grid".into());
     };
+    let camera = scene.camera.ok_or("a scene without a camera")?;
     let slicer = Slicer::new(file.grid.clone())?;
     let values = &file.array.as_ref().ok_or("a grid without an array")?.name;
     let values = &slicer.grid().array(values).ok_or("the grid lacks its array")?.values;
-    let [_, _, forward] = scene.camera.axes();
+    let [_, _, forward] = camera.axes();
     let stack = slicer.slice(&Planes::over(slicer.grid(), forward, count)?)?;
     let mesh = slicer.mesh_of_stack(stack, values, None)?;
     let sheet = |sheet: &MeshSheet| Sheet {
@@ -23,7 +24,7 @@ pub(crate) fn draw(input: &Input, count: usize) -> Result<Image, Box<dyn Error>>
         count: sheet.triangles.end - sheet.triangles.start,
         thickness: sheet.thickness.map(|t| t as f32),
     };
-    let eye = (scene.camera.eye - mesh.origin).dot(mesh.normal);
+    let eye = (camera.eye - mesh.origin).dot(mesh.normal);
     let sheets: Vec<_> = mesh.back_to_front(eye).map(sheet).collect();
     let of_vertices = mesh.points.iter().map(|point| f64::from(point[3]));
     let range = of_vertices
@@ -35,11 +36,11 @@ pub(crate) fn draw(input: &Input, count: usize) -> Result<Image, Box<dyn Error>>
         vertices: SheetVertices::Exact { points: &mesh.points, gradients: &[] },
         triangles: &mesh.triangles,
         sheets: &sheets,
-        transfer: &SheetTransfer::new(&scene.transfer, range),
+        transfer: &SheetTransfer::new(volery_tests::transfer_of(scene), range),
         light: None,
     });
-    let [width, height] = scene.size;
-    let background = scene.background.map(|channel| channel as f32);
-    let frame = Frame { width, height, camera: scene.camera, background, meshes: &[], content };
+    let [width, height] = scene.size.ok_or("a scene without a size")?;
+    let background = scene.background.ok_or("a scene without a background")?.map(|channel| channel as f32);
+    let frame = Frame { width, height, camera, background, meshes: &[], content };
     Ok(SoftwareBackend::new().draw(&frame)?.image)
 }

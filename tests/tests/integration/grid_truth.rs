@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use volery_io::{GridOptions, SceneFile, read_grid};
 use volery_reference::{GridTracer, Image};
-use volery_tests::{at_most, data_folder, distance, scenes_folder};
+use volery_tests::{at_most, data_folder, distance, scenes_folder, transfer_of};
 
 fn against_vtk(name: &str, test: &str, rmse: f64, max: f64) {
     let Some(data) = data_folder(test) else { return };
@@ -17,10 +17,11 @@ fn against_vtk(name: &str, test: &str, rmse: f64, max: f64) {
     let scene = SceneFile::read(&scenes.join(format!("{name}.json"))).unwrap();
     let options = GridOptions { array: scene.input.array.clone(), ..GridOptions::default() };
     let grid = read_grid(&data.join(&scene.input.file), &options).unwrap().grid;
-    let tracer = GridTracer::new(&grid, &grid.arrays()[0].values, &scene.transfer).unwrap();
-    let [width, height] = scene.size;
+    let tracer = GridTracer::new(&grid, &grid.arrays()[0].values, transfer_of(&scene)).unwrap();
+    let [width, height] = scene.size.unwrap();
     let start = Instant::now();
-    let truth = tracer.render(&scene.camera, scene.background, width, height, &|_| {}).unwrap();
+    let truth =
+        tracer.render(&scene.camera.unwrap(), scene.background.unwrap(), width, height, &|_| {}).unwrap();
     println!("{name}: {:.1} s", start.elapsed().as_secs_f64());
     let vtk = volery_io::read_png_rgb(&scenes.join(format!("{name}.vtk.png"))).unwrap();
     let vtk = vtk.pixels.iter().map(|pixel| pixel.map(f64::from)).collect();

@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use volery::glam::DVec3;
 
-use super::{numbers, with_ending};
+use super::{has_ending, numbers, whole, with_ending};
 
 /// `volery slice`
 #[derive(Debug, Args)]
@@ -25,7 +25,7 @@ pub(crate) struct SliceArgs {
         value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["glb", "vsl"])))]
     pub(crate) output: PathBuf,
     /// Planes, evenly over the extent of the grid
-    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = whole(1 << 24))]
     pub(crate) count: u32,
     /// The normal of the planes, of any length
     #[arg(long, value_name = "x|y|z|NX,NY,NZ", default_value = "z", value_parser = parse_axis,
@@ -37,6 +37,15 @@ pub(crate) struct SliceArgs {
     /// Compress the .glb by EXT_meshopt_compression
     #[arg(long)]
     pub(crate) meshopt: bool,
+}
+
+impl SliceArgs {
+    /// An option that the output would not read.
+    pub(super) fn conflict(&self) -> Option<String> {
+        let unread = self.meshopt && !has_ending(&self.output, &["glb"]);
+        let output = self.output.display();
+        unread.then(|| format!("--meshopt compresses .glb files, expected -o OUT.glb in place of {output}"))
+    }
 }
 
 fn parse_axis(text: &str) -> Result<DVec3, String> {

@@ -1,16 +1,17 @@
 //! What the technique stack reads.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use volery::{Slicing, StackView};
+
+use super::whole;
 
 /// What the technique stack alone reads.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Technique stack")]
 pub(crate) struct StackArgs {
     /// Planes over the extent of the grid; with --adaptive those of the first step [default: 128]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    #[arg(long, value_name = "N", value_parser = whole(1 << 24))]
     pub(crate) slices: Option<u32>,
     /// Put more planes between others where cells are, until this share of the cells is met
     #[arg(long, value_name = "SHARE", value_parser = parse_share, allow_negative_numbers = true)]
@@ -31,67 +32,8 @@ pub(crate) struct StackArgs {
     pub(crate) time_steps: Vec<PathBuf>,
 }
 
-impl StackArgs {
-    /// The first option that is given.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        let Self { slices, adaptive, axes, shade, quantized, time_steps } = self;
-        let given = [
-            ("--slices", slices.is_some()),
-            ("--adaptive", adaptive.is_some()),
-            ("--axes", *axes),
-            ("--quantized", *quantized),
-            ("--shade", *shade),
-            ("--time-steps", !time_steps.is_empty()),
-        ];
-        given.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name)
-    }
-
-    /// The first option that is given and needs cells, not slices.
-    pub(crate) fn needs_cells(&self) -> Option<&'static str> {
-        self.given().filter(|&option| option != "--shade")
-    }
-
-    /// What they say of a view.
-    pub(crate) fn view(&self) -> StackView {
-        let defaults = StackView::default();
-        StackView {
-            slicing: if self.axes { Slicing::Axes } else { Slicing::Immediate },
-            num_slices: self.slices.map_or(defaults.num_slices, |slices| slices as usize),
-            adaptive: self.adaptive,
-            is_lit: self.shade,
-            is_quantized: self.quantized,
-            ..defaults
-        }
-    }
-}
-
 fn parse_share(text: &str) -> Result<f64, String> {
     let found: Option<f64> = text.parse().ok();
     let good = found.filter(|share| (0.0..=1.0).contains(share));
     good.ok_or_else(|| "expected a share of the cells, from 0 to 1".to_owned())
-}
-
-/// A path with the number of a time step in place of its `%d` or `%03d`; `None` where it has not exactly one.
-pub(crate) fn numbered(path: &Path, number: usize) -> Option<PathBuf> {
-    let (before, after) = path.to_str()?.split_once('%')?;
-    let (digits, after) = after.split_once('d')?;
-    let is_width = digits.is_empty() || digits.len() == 2 && digits.starts_with('0');
-    let width: usize = if digits.is_empty() { 0 } else { digits.parse().ok()? };
-    let is_good = is_width && !after.contains('%');
-    is_good.then(|| PathBuf::from(format!("{before}{number:0width$}{after}")))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_take_their_place() {
-        let of = |path: &str| numbered(Path::new(path), 7).map(|path| path.to_string_lossy().into_owned());
-        assert_eq!(of("a/b-%03d.png").as_deref(), Some("a/b-007.png"));
-        assert_eq!(of("%d.exr").as_deref(), Some("7.exr"));
-        for wrong in ["a.png", "%.png", "%3d.png", "%0xd.png", "%03d-%03d.png", "%s%d.png", "%099d.png"] {
-            assert_eq!(of(wrong), None, "{wrong}");
-        }
-    }
 }

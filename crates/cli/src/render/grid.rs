@@ -4,115 +4,136 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use volery::io::grid::{TimeStep, read_time_steps};
-use volery::io::{GridFile, GridOptions};
-use volery::{Backend, GridSession, Input, Picture, QuantizedMesh, StackSession, StepChange, View};
+use volery::io::scene_file::SceneTechnique;
+use volery::io::{GridFile, GridOptions, recording_files};
+use volery::report::InputFile;
+use volery::{Backend, GridSession, Picture, QuantizedMesh, StackSession, StackView, StepChange, View};
 
-use super::{Done, Files, notes, of_file, source, view};
-use crate::args::{RenderArgs, Technique, numbered};
+use super::Run;
+use super::files::{self, Done, Files};
+use crate::args::{RenderArgs, numbered};
 use crate::progress::Progress;
-use crate::{Failure, say};
+use crate::{Failure, extent, say, wanted};
+
+/// An option that only volumes read.
+fn of_volumes(run: &Run) -> Option<String> {
+    let Run { args, wanted, .. } = run;
+    let other = |technique: &SceneTechnique| *technique != SceneTechnique::Stack;
+    let technique = wanted.technique.filter(other);
+    let technique = technique.map(|technique| format!("--technique {}", wanted::name_of(technique)));
+    let given = wanted::given(wanted, false);
+    let given = given.into_iter().find(|option| other(&option.technique)).map(|option| option.to_string());
+    let tolerance = wanted.tolerance.map(|_| "--tolerance".to_owned());
+    technique.or(given).or(tolerance).or(args.unread_by_stack().map(str::to_owned))
+}
 
 pub(super) fn run(
-    args: &RenderArgs,
-    input: &Input,
+    run: &Run,
     file: &GridFile,
+    steps: &[TimeStep],
     backend: Box<dyn Backend>,
 ) -> Result<(), Failure> {
-    let technique = (!matches!(args.technique, Technique::Auto | Technique::Stack))
-        .then(|| format!("--technique {}", args.technique.name()));
-    if let Some(option) = technique.or(args.unread_by_stack().map(str::to_owned)) {
-        let path = input.path.display();
-        return Err(Failure(format!("{path}: is an unstructured grid, expected a volume for {option}")));
+    let Run { args, wanted, input, .. } = run;
+    let of_file = |error: &dyn std::error::Error| Failure::of_file(&input.path, error);
+    if let Some(option) = of_volumes(run) {
+        let problem = format!("is an unstructured grid, expected a volume for {option}");
+        return Err(Failure::of_file(&input.path, problem));
     }
+    let num_slices = wanted.slices.map_or(StackView::default().num_slices, |slices| slices as usize);
+    extent::check(&input.path, &file.grid, num_slices, None)?;
     let mut session = {
         let _busy = Progress::spinner("numbering edges");
         let array = file.array.as_ref().map(|array| array.name.as_str());
-        let opened = GridSession::open(file.grid.clone(), array, backend);
-        opened.map_err(|error| of_file(&input.path, &error))?
+        GridSession::open(file.grid.clone(), array, backend).map_err(|error| of_file(&error))?
     };
-    let view = view(args, input, &session)?;
+    let view = wanted::view(args, wanted, input, &session)?;
     if args.is_verified() {
-        view.stack.check_verifiable()?;
+        view.stack.check_verifiable().map_err(|error| of_file(&error))?;
     }
-    if !args.stack.time_steps.is_empty() {
-        return time_steps(args, &mut session, &view);
+    if !steps.is_empty() {
+        return time_steps(run, steps, &mut session, &view);
     }
-    let mut picture = draw(&mut session, &view, args.frames, "drawing")?;
-    (picture.report.input.path, picture.report.seconds.load) = source(&input.path, input.load_seconds);
-    let files =
-        Files { output: &args.output, error_map: args.error_map.as_deref(), report: args.report.as_deref() };
+    let picture = {
+        let _busy = Progress::spinner("drawing");
+        session.render_frames(&view, args.frames as usize).map_err(|error| of_file(&error))?
+    };
     let verify = |picture: &mut Picture, progress: &Done| session.verify(&view, picture, progress);
-    files.write(picture, args.is_verified().then_some(&verify))?;
-    notes(input.notes(), &session, &view)
+    let verify: Option<&files::Verify> = if args.is_verified() { Some(&verify) } else { None };
+    files::finish(run, (&view, SceneTechnique::Stack), picture, verify, &session)
 }
 
 /// Draws slices from a file.
-pub(super) fn run_stack(
-    args: &RenderArgs,
-    input: &Input,
-    mesh: &QuantizedMesh,
-    backend: Box<dyn Backend>,
-) -> Result<(), Failure> {
-    let technique = (!matches!(args.technique, Technique::Auto | Technique::Stack)).then_some("--technique");
-    let verified = args.is_verified().then_some("--verify and --error-map");
-    let others = [technique, args.unread_by_stack(), args.stack.needs_cells(), verified];
-    if let Some(option) = others.into_iter().flatten().next() {
-        let path = input.path.display();
-        return Err(Failure(format!(
-            "{path}: is a stack of slices, expected what they are made of for {option}"
-        )));
+pub(super) fn run_stack(run: &Run, mesh: &QuantizedMesh, backend: Box<dyn Backend>) -> Result<(), Failure> {
+    let Run { args, wanted, input, .. } = run;
+    let of_file = |error: &dyn std::error::Error| Failure::of_file(&input.path, error);
+    let verified = args.is_verified().then(|| "--verify and --error-map".to_owned());
+    // Light needs gradients, which slices have.
+    let cells = wanted::given(wanted, false).into_iter().map(|option| option.to_string());
+    let cells = cells.chain(args.stack.time_steps.first().map(|_| "--time-steps".to_owned()));
+    let cells = cells.into_iter().find(|option| option != "--shade");
+    if let Some(option) = of_volumes(run).or(cells).or(verified) {
+        let problem = format!("is a stack of slices, expected what they are made of for {option}");
+        return Err(Failure::of_file(&input.path, problem));
     }
-    let opened = StackSession::open(mesh.clone(), backend);
-    let mut session = opened.map_err(|error| of_file(&input.path, &error))?;
-    let view = view(args, input, &session)?;
-    let mut picture = {
+    let mut session = StackSession::open(mesh.clone(), backend).map_err(|error| of_file(&error))?;
+    let view = wanted::view(args, wanted, input, &session)?;
+    let picture = {
         let _busy = Progress::spinner("drawing");
-        session.render_frames(&view, args.frames as usize)?
+        session.render_frames(&view, args.frames as usize).map_err(|error| of_file(&error))?
     };
-    (picture.report.input.path, picture.report.seconds.load) = source(&input.path, input.load_seconds);
-    let files = Files { output: &args.output, error_map: None, report: args.report.as_deref() };
-    files.write(picture, None)?;
-    notes(input.notes(), &session, &view)
-}
-
-fn draw(session: &mut GridSession, view: &View, frames: u32, what: &str) -> Result<Picture, Failure> {
-    let _busy = Progress::spinner(what);
-    Ok(session.render_frames(view, frames as usize)?)
+    files::finish(run, (&view, SceneTechnique::Stack), picture, None, &session)
 }
 
 /// Draws every time step by one view.
-fn time_steps(args: &RenderArgs, session: &mut GridSession, view: &View) -> Result<(), Failure> {
-    let steps = steps(&args.stack.time_steps)?;
+fn time_steps(run: &Run, steps: &[TimeStep], session: &mut GridSession, view: &View) -> Result<(), Failure> {
+    let args = run.args;
     let bar = Progress::bar("drawing time steps");
     for (number, step) in steps.iter().enumerate() {
         bar.set(number as f64 / steps.len() as f64);
         let start = Instant::now();
         let options = GridOptions { array: Some(session.array().to_owned()), ..GridOptions::default() };
-        let file = step.read(&options)?;
+        let (file, opened) = recording_files(|| step.read(&options));
+        let file = file?;
+        run.outputs.check_inputs(opened.iter().map(|file| file.path.as_path()))?;
         let load_seconds = start.elapsed().as_secs_f64();
         // A step has at least one file.
         let path = step.files.first().map_or(Path::new(""), PathBuf::as_path);
-        let change = session.set_step(file.grid).map_err(|error| of_file(path, &error))?;
-        let mut picture = session.render_frames(view, args.frames as usize)?;
-        (picture.report.input.path, picture.report.seconds.load) = source(path, load_seconds);
-        let name = |path: &Path| numbered(path, number).expect("the command line was checked");
-        let error_map = args.error_map.as_deref().map(name);
-        let report = args.report.as_deref().map(name);
-        let output = name(&args.output);
-        let files = Files { output: &output, error_map: error_map.as_deref(), report: report.as_deref() };
-        let drawn = &*session;
-        let verify = |picture: &mut Picture, progress: &Done| drawn.verify(view, picture, progress);
-        files.write(picture, args.is_verified().then_some(&verify))?;
+        let change = session.set_step(file.grid).map_err(|error| Failure::of_file(path, error))?;
+        let drawn = session.render_frames(view, args.frames as usize);
+        let mut picture = drawn.map_err(|error| Failure::of_file(path, error))?;
+        picture.report.input.path = Some(path.to_string_lossy().into_owned());
+        picture.report.inputs = opened.iter().map(InputFile::from).collect();
+        picture.report.seconds.load = Some(load_seconds);
+        write_step(args, (number, path), session, view, &mut picture)?;
         if change == StepChange::Cells && number > 0 {
             say(format_args!("note: {}: has other points or cells than the step before", path.display()))?;
         }
-        notes(&file.notes, drawn, view)?;
+        files::notes(&file.notes, session, view)?;
     }
     Ok(())
 }
 
+fn write_step(
+    args: &RenderArgs,
+    (number, path): (usize, &Path),
+    session: &GridSession,
+    view: &View,
+    picture: &mut Picture,
+) -> Result<(), Failure> {
+    let name = |path: &Path| numbered(path, number).expect("the command line was checked");
+    let (error_map, report) = (args.error_map.as_deref().map(name), args.report.as_deref().map(name));
+    let files = Files {
+        input: path,
+        outputs: vec![name(&args.output)],
+        error_map: error_map.as_deref(),
+        report: report.as_deref(),
+    };
+    let verify = |picture: &mut Picture, progress: &Done| session.verify(view, picture, progress);
+    files.write(picture, if args.is_verified() { Some(&verify) } else { None })
+}
+
 /// The steps of a collection, or one for each file.
-fn steps(files: &[PathBuf]) -> Result<Vec<TimeStep>, Failure> {
+pub(super) fn steps(files: &[PathBuf]) -> Result<Vec<TimeStep>, Failure> {
     let is_collection =
         |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pvd"));
     if let [file] = files

@@ -7,7 +7,8 @@ use volery_scene::{CellType, Cells, UnstructuredGrid};
 
 use super::kinds::{self, Kind};
 use super::{ArrayRange, GridArray, GridOptions, Part, Piece, PieceArray, PieceCells, Place};
-use crate::error::{Problem, quoted};
+use crate::error::{OneLine, Problem, quoted};
+use crate::near::one_of;
 
 /// Bytes of a point and its value, of a cell without its nodes, of a node of a cell.
 const POINT_BYTES: u128 = 32;
@@ -115,7 +116,7 @@ fn choose(
         }
         return found.map(|found| Some(found.array.clone())).ok_or_else(|| {
             let names: Vec<_> = arrays.iter().map(|array| array.array.name.as_str()).collect();
-            Problem::field("array", quoted(name), format!("one of {}", quoted(names.join(", "))))
+            Problem::field("array", quoted(name), format!("one of {}", OneLine(one_of(name, &names))))
         });
     }
     let mut candidates: Vec<_> = arrays.iter().filter(|array| !is_ghost(&array.array)).collect();

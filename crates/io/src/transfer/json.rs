@@ -30,7 +30,7 @@ struct PointJson {
 }
 
 impl TransferJson {
-    fn new(transfer: &TransferFunction) -> Self {
+    pub(crate) fn new(transfer: &TransferFunction) -> Self {
         let point = |&ControlPoint { value, color, opacity }: &_| PointJson { value, color, opacity };
         let points = transfer.points().iter().map(point).collect();
         Self { points, unit_distance: transfer.unit_distance() }
@@ -45,7 +45,7 @@ impl TransferJson {
 /// The transfer function over value and gradient magnitude.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Transfer2dJson {
+pub(crate) struct Transfer2dJson {
     values: [f64; 2],
     magnitudes: [f64; 2],
     columns: usize,
@@ -93,7 +93,7 @@ pub enum Transfer2dProblem {
 }
 
 impl Transfer2dJson {
-    fn new(function: &TransferFunction2d) -> Self {
+    pub(crate) fn new(function: &TransferFunction2d) -> Self {
         let palette = function.palette();
         let Sliders { global_opacity, gradient_weight, selection } = function.sliders();
         Self {
@@ -110,7 +110,7 @@ impl Transfer2dJson {
         }
     }
 
-    fn validated(self) -> Result<TransferFunction2d, Transfer2dProblem> {
+    pub(crate) fn validated(self) -> Result<TransferFunction2d, Transfer2dProblem> {
         let Self { values, magnitudes, columns, rows, colors, opacities, unit_distance, .. } = self;
         for (field, found) in [("colors", colors.len()), ("opacities", opacities.len())] {
             if columns.checked_mul(rows) != Some(found) {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// What a name of a volume can end in.
 pub(super) const ENDINGS: &str = "one that ends in .raw, .raw.gz, .raw.zst, .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, \
-    .vti, .pvti, .vtk, .tif, .tiff, .png, .jpg or .jpeg, or dims and dtype";
+    .vti, .pvti, .vtk, .tif, .tiff, .png, .jpg or .jpeg, or dims and dtype (--dims, --dtype)";
 
 const TO_NIFTI: &str = "a format that is read: dcm2niix makes NIfTI of it";
 const TO_NRRD: &str = "a format that is read: save it as NRRD, NIfTI or TIFF";

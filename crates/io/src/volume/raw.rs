@@ -55,7 +55,8 @@ fn from_name(name: &str) -> Result<([u64; 3], Element), Problem> {
     let element = words().find_map(|word| word.parse().ok());
     let dims = words().find_map(parse_dims);
     dims.zip(element).ok_or_else(|| {
-        Problem::field("file name", quoted(name), "one such as name_256x256x128_uint8.raw, or dims and dtype")
+        let expected = "one such as name_256x256x128_uint8.raw, or dims and dtype (--dims, --dtype)";
+        Problem::field("file name", quoted(name), expected)
     })
 }
 

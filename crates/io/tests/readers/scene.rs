@@ -1,4 +1,7 @@
-use volery_io::scene_file::{InputKind, SceneFile};
+use volery_io::scene_file::{
+    InputKind, SceneBackend, SceneFile, SceneFocus, SceneInput, SceneMesh, ScenePlane, SceneTechnique,
+    SceneThickness, SceneTransfer,
+};
 use volery_io::{ByteOrder, Element};
 use volery_scene::{Projection, SampleType};
 
@@ -12,17 +15,20 @@ const SCENE: &str = r#"{"name": "tooth", "input": {"kind": "volume", "file": "to
 
 #[test]
 fn every_field_arrives() {
-    let scene = SceneFile::parse(SCENE, "unused").unwrap();
-    assert_eq!((scene.name.as_str(), scene.size, scene.background), ("tooth", [512, 256], [0.0, 0.5, 1.0]));
-    assert_eq!(scene.input.kind, InputKind::Volume);
+    let scene = SceneFile::parse(SCENE).unwrap();
+    assert_eq!(scene.name.as_deref(), Some("tooth"));
+    assert_eq!((scene.size, scene.background), (Some([512, 256]), Some([0.0, 0.5, 1.0])));
+    assert_eq!(scene.input.kind, Some(InputKind::Volume));
     assert_eq!(scene.input.file.to_str(), Some("tooth.raw"));
     let options = scene.input.read_options();
     assert_eq!(options.dims, Some([103, 94, 161]));
     assert_eq!(options.element, Some(Element { sample: SampleType::U16, order: ByteOrder::Big }));
     assert_eq!(options.spacing.map(|s| s.to_array()), Some([1.0, 1.0, 2.5]));
-    assert_eq!(scene.camera.projection, Projection::Perspective { fov_y_deg: 30.0 });
-    assert_eq!(scene.camera.eye.to_array(), [240.0, -150.0, 180.0]);
-    assert_eq!(scene.transfer.points().len(), 1);
+    let camera = scene.camera.unwrap();
+    assert_eq!(camera.projection, Projection::Perspective { fov_y_deg: 30.0 });
+    assert_eq!(camera.eye.to_array(), [240.0, -150.0, 180.0]);
+    let Some(SceneTransfer::Values(transfer)) = scene.transfer else { panic!("no points") };
+    assert_eq!(transfer.points().len(), 1);
 }
 
 #[test]
@@ -34,17 +40,17 @@ fn a_grid_an_orthographic_camera_and_a_scene_without_a_name() {
         .replace("\"name\": \"tooth\", ", "");
     let folder = Folder::new();
     let scene = SceneFile::read(&folder.put("beside.json", text)).unwrap();
-    assert_eq!((scene.name.as_str(), scene.input.kind), ("beside", InputKind::Grid));
+    assert_eq!((scene.name, scene.input.kind), (None, Some(InputKind::Grid)));
     assert_eq!(scene.input.array.as_deref(), Some("Umag"));
-    assert_eq!(scene.camera.projection, Projection::Orthographic { height: 12.5 });
+    assert_eq!(scene.camera.unwrap().projection, Projection::Orthographic { height: 12.5 });
 }
 
 #[test]
 fn meshes_of_a_scene() {
-    assert_eq!(SceneFile::parse(SCENE, "").unwrap().meshes, []);
+    assert_eq!(SceneFile::parse(SCENE).unwrap().meshes, []);
     let text =
         SCENE.replace("\"name\"", "\"meshes\": [{\"file\": \"hull.obj\", \"color\": [0, 0.5, 1]}], \"name\"");
-    let meshes = SceneFile::parse(&text, "").unwrap().meshes;
+    let meshes = SceneFile::parse(&text).unwrap().meshes;
     assert_eq!(meshes.len(), 1);
     assert_eq!((meshes[0].file.to_str(), meshes[0].color), (Some("hull.obj"), [0.0, 0.5, 1.0]));
 }
@@ -56,7 +62,7 @@ fn what_a_scene_cannot_be() {
         ("\"fov_y_deg\"", "\"fov\"", "unknown field `fov`, expected one of"),
         ("\"dims\"", "\"dim\"", "unknown field `dim`, expected one of"),
         ("\"kind\": \"volume\"", "\"kind\": \"mesh\"", "unknown variant `mesh`, expected `volume` or `grid`"),
-        ("\"size\": [512, 256], ", "", "missing field `size`"),
+        ("\"file\": \"tooth.raw\", ", "", "missing field `file`"),
         ("[512, 256]", "[0, 256]", "size is 0 x 256, expected 1 to 65536 each"),
         ("[512, 256]", "[65537, 1]", "size is 65537 x 1, expected"),
         ("[512, 256]", "[65536, 65536]", "size is 65536 x 65536, expected"),
@@ -87,7 +93,28 @@ fn what_a_scene_cannot_be() {
             "meshes[1].color is [0.0, 2.0, 0.0], expected three numbers in [0, 1]",
         ),
         ("\"opacity\": 0", "\"opacity\": 2", "transfer function: point 0: opacity 2"),
-        ("\"points\": [{", "\"points\": [], \"x\": [{", "unknown field `x`"),
+        ("\"points\": [{", "\"points\": [], \"x\": [{", "transfer_function: unknown field `x`"),
+        ("\"name\"", "\"range\": [3, 2], \"name\"", "range is [3.0, 2.0], expected two finite values"),
+        ("\"name\"", "\"tolerance\": 2, \"name\"", "tolerance is 2.0, expected a number in [0, 1]"),
+        ("\"name\"", "\"error\": -1, \"name\"", "error is -1.0, expected a number in [0, 1]"),
+        ("\"name\"", "\"adaptive\": 1.5, \"name\"", "adaptive is 1.5, expected a number in [0, 1]"),
+        ("\"name\"", "\"slices\": 0, \"name\"", "slices is 0, expected 1 to"),
+        (
+            "\"name\"",
+            "\"technique\": \"rays\", \"name\"",
+            "unknown variant `rays`, expected one of `raycast`",
+        ),
+        (
+            "\"name\"",
+            "\"focus\": {\"point\": [0, 0, 0], \"quality\": -1}, \"name\"",
+            "focus.quality is -1.0, expected at least 0",
+        ),
+        (
+            "\"name\"",
+            "\"planes\": [{\"normal\": [0, 0, 0], \"distance\": 1}], \"name\"",
+            "planes[0]: normal [0, 0, 0]",
+        ),
+        ("[103, 94, 161]", "[103, 0, 161]", "input.dims is [103, 0, 161], expected three counts"),
     ];
     let folder = Folder::new();
     for (from, to, expected) in cases {
@@ -98,11 +125,56 @@ fn what_a_scene_cannot_be() {
         assert!(rest.starts_with(expected) && !line.contains('\n'), "{line}, expected {expected}");
     }
     for text in ["", "{", "[]", "null", "\u{0}", &"[".repeat(100_000), &SCENE[..300]] {
-        assert!(SceneFile::parse(text, "").is_err());
+        assert!(SceneFile::parse(text).is_err());
     }
     let binary = SceneFile::read(&folder.put("scene.json", b"\xff\xfe{}")).unwrap_err().to_string();
     assert!(binary.contains("the text is damaged"), "{binary}");
     assert!(
         SceneFile::read(folder.0.path()).unwrap_err().to_string().ends_with("is a folder, expected a file")
     );
+}
+
+#[test]
+fn a_scene_needs_its_input_alone_and_comes_back_bit_for_bit() {
+    let least = SceneFile::parse(r#"{"input": {"file": "a.nrrd"}}"#).unwrap();
+    let input = SceneInput { file: "a.nrrd".into(), ..SceneInput::default() };
+    assert_eq!(least, SceneFile { input, ..SceneFile::default() });
+    let whole = SceneFile::parse(SCENE).unwrap();
+    let full = SceneFile {
+        range: Some([0.1, 1e300]),
+        technique: Some(SceneTechnique::Plane),
+        tolerance: Some(0.1 + 0.2),
+        planes: vec![ScenePlane { normal: [0.3, 0.5, 0.81], distance: 1.0 / 3.0 }],
+        focus: Some(SceneFocus { point: [1.0, -2e-300, 3.0], quality: 0.7 }),
+        error: Some(f64::MIN_POSITIVE),
+        transparent: true,
+        nearest: true,
+        show_nodes: true,
+        thickness: Some(SceneThickness::Interpolated),
+        slices: Some(7),
+        adaptive: Some(0.9),
+        axes: true,
+        shade: true,
+        quantized: true,
+        backend: Some(SceneBackend::Software),
+        meshes: vec![SceneMesh { file: "b.obj".into(), color: [0.1, 0.2, 0.3] }],
+        ..whole.clone()
+    };
+    let named = SceneFile { transfer: Some(SceneTransfer::Preset("viridis".to_owned())), ..whole.clone() };
+    let folder = Folder::new();
+    for scene in [least, whole, full, named] {
+        let path = folder.path("scene.json");
+        scene.write(&path).unwrap();
+        assert_eq!(SceneFile::read(&path).unwrap(), scene);
+    }
+}
+
+#[test]
+fn the_name_of_a_type_is_read_as_that_type() {
+    for name in
+        ["u1", "i1", "<u2", ">u2", "<i2", ">i2", "<u4", ">u4", "<i4", ">i4", "<f4", ">f4", "<f8", ">f8"]
+    {
+        let element: Element = name.parse().unwrap();
+        assert_eq!(element.to_string(), name);
+    }
 }

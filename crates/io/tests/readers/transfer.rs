@@ -19,7 +19,7 @@ fn our_json() {
     let folder = Folder::new();
     let text = r#"{"points": [{"value": 1, "color": [0, 0.5, 1], "opacity": 0},
         {"value": 3, "color": [1, 0.5, 0], "opacity": 0.5}], "unit_distance": 2.5}"#;
-    let NamedTransfer { name, transfer } = read(&folder, text, &ANY).unwrap();
+    let NamedTransfer { name, transfer, .. } = read(&folder, text, &ANY).unwrap();
     assert_eq!((name.as_str(), transfer.unit_distance()), ("map", 2.5));
     assert_eq!(transfer.classify(2.0), ([0.5, 0.5, 0.5], 0.25));
     for (from, to, expected) in [
@@ -50,7 +50,7 @@ fn paraview_maps_one_or_several_with_trailing_commas() {
     let folder = Folder::new();
     let one = r#"{"Name": "Gray, really", "Creator": "hand", "ColorSpace": "RGB", "NanColor": [1, 0, 0],
         "RGBPoints": [0, 0, 0, 0,  2, 1, 1, 1,], "Points": [0, 0, 0.5, 0, 2, 0.5, 0.5, 0],}"#;
-    let NamedTransfer { name, transfer } = read(&folder, one, &ANY).unwrap();
+    let NamedTransfer { name, transfer, .. } = read(&folder, one, &ANY).unwrap();
     assert_eq!(name, "Gray, really");
     assert_eq!(transfer.classify(1.0), ([0.5; 3], 0.25));
     let options = TransferOptions { range: Some([-10.0, 30.0]), unit_distance: 4.0, ..ANY };

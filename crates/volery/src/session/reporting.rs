@@ -27,7 +27,10 @@ impl Session {
             error: view.planes.max_error.filter(|_| planes.is_some()),
             quality: focus.map(|focus| focus.quality),
         };
+        let is_color = self.grid.sample_type().channels() > 1;
         Report {
+            version: report::VERSION,
+            inputs: Vec::new(),
             input: report::Input {
                 path: None,
                 kind: if dims[2] == 1 { "image" } else { "volume" },
@@ -39,6 +42,8 @@ impl Session {
             thickness: matches!(plan, Plan::Cubes(_)).then(|| view.thickness.name()),
             backend: report::Backend::of(self.backend.device()),
             image: report::ImageSize { width: view.width, height: view.height },
+            camera: view.camera,
+            transfer_function: (!is_color).then(|| report::transfer_of(view)),
             seconds: Times::median(times, self.build_seconds),
             frames: Times::frames(times),
             work: report::Work {

@@ -82,6 +82,8 @@ pub struct ViewOptions {
     /// Values to colour and extinction; if missing [`Preset::Auto`](crate::Preset::Auto) for matter, grey from
     /// black to white over the range of values for planes.
     pub transfer: Option<TransferFunction>,
+    /// The values that automatic colours run over; if missing, those that are worth colours.
+    pub range: Option<[f64; 2]>,
     /// Which planes; if there is none, the image itself, or the three in the middle of a volume.
     pub planes: PlaneView,
     /// How cells are sliced.
@@ -96,6 +98,7 @@ impl Default for ViewOptions {
             direction: None,
             orthographic: false,
             transfer: None,
+            range: None,
             planes: PlaneView::default(),
             stack: StackView::default(),
         }

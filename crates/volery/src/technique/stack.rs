@@ -368,11 +368,15 @@ impl Frames {
     ) -> Result<Picture, RenderError> {
         let image = self.last.ok_or(RenderError::NoFrame)?;
         let report = Report {
+            version: report::VERSION,
             input,
+            inputs: Vec::new(),
             technique: NAME,
             thickness: None,
             backend: report::Backend::of(device),
             image: report::ImageSize { width: view.width, height: view.height },
+            camera: view.camera,
+            transfer_function: Some(report::transfer_of(view)),
             seconds: Times::median(&self.times, build_seconds),
             frames: Times::frames(&self.times),
             work: report::Work {

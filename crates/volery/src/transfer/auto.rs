@@ -149,7 +149,7 @@ impl Matter {
 
 /// The first bin of matter: Li and Lee's threshold, by fixed-point iteration (Li, Tam 1998), over the place of
 /// a bin in the histogram. `None` if there are not two kinds.
-fn threshold(counts: &[u64]) -> Option<usize> {
+pub(crate) fn threshold(counts: &[u64]) -> Option<usize> {
     let mean_of = |bins: std::ops::Range<usize>| {
         let (mut sum, mut count) = (0.0, 0.0);
         for bin in bins {

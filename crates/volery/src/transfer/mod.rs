@@ -3,10 +3,11 @@
 mod auto;
 mod colors;
 
+pub(crate) use auto::threshold;
 pub use colors::ColorMap;
 
 use glam::DVec3;
-use volery_scene::{ControlPoint, TransferFunction};
+use volery_scene::{ControlPoint, Samples, TransferFunction};
 
 use crate::histogram::Histogram;
 
@@ -78,13 +79,31 @@ impl Preset {
         Self::all().find(|preset| preset.name() == name)
     }
 
+    /// Whether it depends on the values that it is for.
+    pub const fn is_automatic(self) -> bool {
+        !matches!(self, Self::CtBone | Self::CtSoftTissue)
+    }
+
+    /// The transfer function for samples: over a range of values, or over those that are worth colours
+    /// ([`Histogram::of_matter`]). `None` if every sample is blank, or the range too wide for an `f64`.
+    ///
+    /// # Panics
+    /// Never: samples have a first channel.
+    pub fn over(self, samples: &Samples, range: Option<[f64; 2]>, extent: DVec3) -> Option<TransferFunction> {
+        let histogram = match range {
+            Some(range) => Histogram::within(samples, 0, range),
+            None => Histogram::of_matter(samples, 0),
+        };
+        Some(self.transfer(&histogram?, extent))
+    }
+
     /// The transfer function for a volume with this histogram and extent in world units.
     ///
     /// # Panics
     /// When the histogram is not one that [`Histogram::of`] makes.
     pub fn transfer(self, histogram: &Histogram, extent: DVec3) -> TransferFunction {
         let unit = unit_distance(extent);
-        let points = match self {
+        let mut points = match self {
             Self::Auto => {
                 let colors = colors::from_hex(&AUTO_COLORS);
                 auto::points(histogram, extent, unit, |place| colors::interpolate(&colors, place.mixed))
@@ -107,6 +126,13 @@ impl Preset {
             Self::CtBone => hounsfield(&CT_BONE),
             Self::CtSoftTissue => hounsfield(&CT_SOFT_TISSUE),
         };
+        if let Some(&last) = points.last().filter(|_| self.is_automatic() && histogram.counted[1].is_finite())
+        {
+            // Nothing of what is above stands for matter.
+            let ceiling = histogram.counted[1].max(last.value).next_up();
+            points.push(ControlPoint { value: ceiling, ..last });
+            points.push(ControlPoint { value: ceiling, opacity: 0.0, ..last });
+        }
         TransferFunction::new(points, unit)
             .expect("a preset has rising values, colours and opacities in [0, 1]")
     }

@@ -1,0 +1,158 @@
+//! Where a picture and what is known of it go.
+
+use std::path::{Path, PathBuf};
+
+use volery::info::number;
+use volery::io::scene_file::SceneTechnique;
+use volery::io::write_atomically;
+use volery::output::{ErrorMap, write_image};
+use volery::report::InputFile;
+use volery::{Input, Picture, Report, VerifyError, View, reference};
+
+use super::{Run, empty};
+use crate::args::numbered;
+use crate::drawn::Drawn;
+use crate::progress::Progress;
+use crate::{Failure, save, say};
+
+/// Hears how much is done, in [0, 1].
+pub(super) type Done<'a> = dyn Fn(f64) + Sync + 'a;
+
+/// Measures the error of a picture, and returns the exact one.
+pub(super) type Verify<'a> = dyn Fn(&mut Picture, &Done) -> Result<reference::Image, VerifyError> + 'a;
+
+/// The files of one picture.
+pub(super) struct Files<'a> {
+    /// What is drawn.
+    pub(super) input: &'a Path,
+    /// Several where each frame has its own.
+    pub(super) outputs: Vec<PathBuf>,
+    pub(super) error_map: Option<&'a Path>,
+    pub(super) report: Option<&'a Path>,
+}
+
+impl Files<'_> {
+    /// Writes the picture, measures its error where that was asked for, and says what a user wants to know.
+    pub(super) fn write(&self, picture: &mut Picture, verify: Option<&Verify>) -> Result<(), Failure> {
+        for output in &self.outputs {
+            write_image(output, &picture.image)?;
+        }
+        let mut error_map = None;
+        if let Some(verify) = verify {
+            let truth = {
+                let bar = Progress::bar("computing the exact picture");
+                verify(picture, &|done| bar.set(done)).map_err(|error| Failure::of_file(self.input, error))?
+            };
+            if let Some(path) = self.error_map {
+                let map = ErrorMap::new(&picture.image, &truth)?;
+                write_image(path, &map.image)?;
+                error_map = Some(format!("{}: |picture - reference| x {}", path.display(), map.gain));
+            }
+        }
+        if let Some(path) = self.report {
+            write_report(path, &picture.report)?;
+        }
+        for output in &self.outputs {
+            say(summary(output, &picture.report))?;
+        }
+        error_map.map_or(Ok(()), say)
+    }
+}
+
+/// Writes all that a run of one view asks for, and says what a user wants to know.
+pub(super) fn finish(
+    run: &Run,
+    (view, technique): (&View, SceneTechnique),
+    mut picture: Picture,
+    verify: Option<&Verify>,
+    session: &dyn Drawn,
+) -> Result<(), Failure> {
+    let Run { args, wanted, input, .. } = run;
+    name_sources(&mut picture.report, input);
+    let names = (0..args.frames as usize).map_while(|frame| numbered(&args.output, frame));
+    let mut outputs: Vec<PathBuf> = names.collect();
+    if outputs.is_empty() {
+        outputs.push(args.output.clone());
+    }
+    let (error_map, report) = (args.error_map.as_deref(), args.report.as_deref());
+    Files { input: &input.path, outputs, error_map, report }.write(&mut picture, verify)?;
+    if let Some(path) = &args.save_scene {
+        save::save_scene(path, wanted, (view, technique), session.has_colors())?;
+    }
+    notes(input.notes(), session, view)?;
+    match empty::reason(&picture.image, view, input) {
+        None => Ok(()),
+        Some(reason) => say(format_args!("note: nothing is seen: {reason}")),
+    }
+}
+
+/// Says in a report what was read.
+pub(super) fn name_sources(report: &mut Report, input: &Input) {
+    report.input.path = Some(input.path.to_string_lossy().into_owned());
+    report.inputs = input.files.iter().map(InputFile::from).collect();
+    report.seconds.load = Some(input.load_seconds);
+}
+
+pub(super) fn write_report(path: &Path, report: &Report) -> Result<(), Failure> {
+    let json = report.to_json();
+    write_atomically(path, |file| std::io::Write::write_all(file, json.as_bytes()))?;
+    Ok(())
+}
+
+/// What a user wants to know about a picture, without the JSON.
+pub(crate) fn summary(output: &Path, report: &Report) -> String {
+    let Report { seconds, work, .. } = report;
+    let parts = [
+        ("select", Some(seconds.select)),
+        ("slice", seconds.geometry),
+        ("upload", seconds.upload),
+        ("draw", Some(seconds.draw)),
+    ];
+    let parts = parts.iter().filter_map(|(name, seconds)| Some(format!("{name} {:.1}", 1e3 * (*seconds)?)));
+    let parts = parts.collect::<Vec<_>>().join(", ");
+    let amount = match (work.nodes, work.triangles) {
+        (Some(nodes), _) => format!("{nodes} nodes"),
+        (None, triangles) => format!("{} triangles", triangles.unwrap_or_default()),
+    };
+    let mut text = format!(
+        "{}: {}x{}, {}, {} ({})\n{:.1} ms a frame: {}; {}, {} resident",
+        output.display(),
+        report.image.width,
+        report.image.height,
+        report.technique,
+        report.backend.kind,
+        report.backend.device,
+        1e3 * seconds.frame,
+        parts,
+        amount,
+        megabytes(report.work.bytes_resident),
+    );
+    let error = report.error.unwrap_or_default();
+    if let Some(bound) = error.bound_max {
+        text += &format!("\nbound: no colour differs by more than {bound:.5} from full resolution");
+    }
+    if let Some(found) = error.measured {
+        let rmse = found.measured_rmse;
+        text += &format!("\nerror: max {:.5}, rmse {rmse:.6} against {}", found.measured_max, found.against);
+    }
+    text
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+/// Says what the reader decided, and why there may be nothing to see.
+pub(super) fn notes(of_file: &[String], session: &dyn Drawn, view: &View) -> Result<(), Failure> {
+    for note in of_file {
+        say(format_args!("note: {note}"))?;
+    }
+    let [low, high] = session.value_range();
+    if view.stack.classification.is_none() && view.transfer.is_transparent(low, high) {
+        let [low, high] = [low, high].map(number);
+        say(format_args!(
+            "note: the transfer function is transparent for all values of the file, {low} to {high}"
+        ))?;
+    }
+    Ok(())
+}
