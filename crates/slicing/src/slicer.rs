@@ -114,12 +114,15 @@ impl Slicer {
         self.outline.get_or_init(|| Outline::of_classes(self, 1, |_| Some(0)).pop().unwrap_or_default())
     }
 
-    /// The middle of the outline's bounds.
-    pub(crate) fn middle(&self) -> DVec3 {
+    /// The middle of the outline's bounds, and how far they reach from it.
+    pub(crate) fn middle_and_reach(&self) -> [DVec3; 2] {
         let points = self.outline().nodes.iter().map(|&node| self.grid.points()[node as usize]);
         let bounds = points.map(|point| [point; 2]);
         let bounds = bounds.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
-        bounds.map_or(DVec3::ZERO, |[low, high]| low + 0.5 * (high - low))
+        bounds.map_or([DVec3::ZERO; 2], |[low, high]| {
+            let reach = 0.5 * high - 0.5 * low;
+            [low + reach, reach]
+        })
     }
 
     pub(crate) fn num_cells(&self) -> usize {
