@@ -67,15 +67,12 @@ impl Sheets<'_> {
             None => [1.0; 3],
             Some(Light { ambient, diffuse, .. }) => [1.0, ambient, ambient + diffuse],
         };
-        let mut range = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        for (color, shade) in self.transfer.entries.iter().flat_map(|entry| shades.map(|shade| (entry, shade))) {
-            for channel in 0..3 {
-                let emitted = color[channel] * shade;
-                range[0][channel] = range[0][channel].min(emitted);
-                range[1][channel] = range[1][channel].max(emitted);
-            }
-        }
-        range
+        let of = |channel: usize, join: fn(f32, f32) -> f32, none: f32| {
+            let colors = self.transfer.entries.iter().map(|entry| entry[channel]);
+            colors.flat_map(|color| shades.map(|shade| color * shade)).fold(none, join)
+        };
+        [(f32::min as fn(f32, f32) -> f32, f32::INFINITY), (f32::max, f32::NEG_INFINITY)]
+            .map(|(join, none)| [0, 1, 2].map(|channel| of(channel, join, none)))
     }
 }
 

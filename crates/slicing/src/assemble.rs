@@ -67,8 +67,8 @@ impl Part {
     /// Positions of the planes that vertices may lie on: a cell without volume has an outline, and no slice.
     fn planes(&self, origin: f64) -> impl Iterator<Item = f64> {
         let has_vertices = move |&(place, layer): &(usize, &Layer)| {
-            let beside = self.strips.gaps.iter().skip(place).take(2);
-            layer.section.is_some() || beside.into_iter().any(|gap| !gap.is_empty())
+            let mut beside = self.strips.gaps.iter().skip(place).take(2);
+            layer.section.is_some() || beside.any(|gap| !gap.is_empty())
         };
         let layers = self.stack.layers().iter().enumerate().filter(has_vertices);
         layers.map(move |(_, layer)| layer.position - origin)

@@ -44,7 +44,9 @@ pub enum Error {
         found: usize,
     },
     /// A grid that is no thicker along the normal than rounding of its coordinates.
-    #[error("slicing planes: the grid is flat along {normal}, at {position}, expected an extent to spread planes over")]
+    #[error(
+        "slicing planes: the grid is flat along {normal}, at {position}, expected an extent to spread planes over"
+    )]
     Flat {
         /// The unit normal.
         normal: DVec3,
@@ -52,7 +54,9 @@ pub enum Error {
         position: f64,
     },
     /// Planes so near to one another that numbers cannot tell their positions apart.
-    #[error("slicing planes: {count} planes from {low} to {high}, expected so few that 64 bits tell their positions apart")]
+    #[error(
+        "slicing planes: {count} planes from {low} to {high}, expected so few that 64 bits tell their positions apart"
+    )]
     TooFine {
         /// How many.
         count: usize,

@@ -11,7 +11,8 @@ const BACKGROUND: [f32; 3] = [0.2, 0.4, 0.1];
 
 /// Crooked, and numbered so that faces are split by either diagonal.
 fn cube() -> Vec<DVec3> {
-    let corners = [[0, 0, 0], [9, 1, 0], [10, 9, 1], [1, 10, 0], [0, 1, 9], [9, 0, 10], [10, 10, 9], [0, 9, 10]];
+    let corners =
+        [[0, 0, 0], [9, 1, 0], [10, 9, 1], [1, 10, 0], [0, 1, 9], [9, 0, 10], [10, 10, 9], [0, 9, 10]];
     corners.map(|corner| DVec3::from_array(corner.map(|x| 0.1 * f64::from(x)))).to_vec()
 }
 
@@ -128,7 +129,8 @@ fn collapsed_cells_look_like_their_tetrahedra() {
 fn cells_without_volume_do_not_show_however_dense() {
     let points = cube();
     // In a plane across the view: a tetrahedron, a pyramid, and a wedge folded onto itself.
-    let across = |x: f64, y: f64| DVec3::splat(0.5) + DVec3::new(3.0, -2.0, 0.0) * x * 0.1 + DVec3::Z * y * 0.3;
+    let across =
+        |x: f64, y: f64| DVec3::splat(0.5) + DVec3::new(3.0, -2.0, 0.0) * x * 0.1 + DVec3::Z * y * 0.3;
     let flat = [across(-1.0, -1.0), across(1.0, -1.1), across(1.2, 1.0), across(-0.9, 1.3), across(0.1, 0.2)];
     let cells = [
         (CellType::Tetrahedron, vec![0, 1, 2, 3]),

@@ -198,7 +198,12 @@ impl Scene {
                 light = over([r, g, b].map(|x| x * shade), depth, light);
             }
         }
-        std::array::from_fn(|i| light[i].clamp(self.emitted(i, f64::min).min(background[i]), self.emitted(i, f64::max).max(background[i])))
+        std::array::from_fn(|i| {
+            light[i].clamp(
+                self.emitted(i, f64::min).min(background[i]),
+                self.emitted(i, f64::max).max(background[i]),
+            )
+        })
     }
 
     /// The least or the largest number that a channel of the matter's colours has.

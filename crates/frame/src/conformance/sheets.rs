@@ -239,6 +239,9 @@ pub fn strips_add_and_take_away(backend: &mut dyn Backend) {
     cameras().iter().for_each(|(what, camera)| scene.check(what, backend, camera, MAX));
     scene.table = Table::ramp(12.0);
     cameras().iter().for_each(|(what, camera)| scene.check(what, backend, camera, 3.0 * MAX));
+    // What strips add or take away is bounded.
+    scene.table = Table::ramp(120.0);
+    cameras().iter().for_each(|(what, camera)| scene.check(what, backend, camera, 3.0 * MAX));
 }
 
 /// Of nothing no more is taken away than [`crate::sheets::MAX_STRIP_DEPTH`], and light that all but ended may rise again.
@@ -249,8 +252,13 @@ pub fn negative_thickness_is_bounded(backend: &mut dyn Backend) {
     let mut layer = |position: f64, thickness: f32, value: f64| {
         scene.add_square(DVec3::Z * position, 50.0, 2, thickness, &mut random, |_| value);
     };
-    layer(-1.0, 0.8, 1.0);
-    (0..16).for_each(|i| layer(0.01 * f64::from(i), if i % 2 == 0 { -7.0 } else { -0.3 }, 1.0));
+    layer(-1.0, 6.0, 1.0);
+    let thickness = |i: i32| match i % 2 {
+        _ if i == 0 => -7.0,
+        0 => -0.7,
+        _ => -0.3,
+    };
+    (0..16).for_each(|i| layer(0.01 * f64::from(i), thickness(i), 1.0));
     layer(0.9, 9.0, 1.0);
     let sheets = scene.back_to_front(&camera);
     let expected = each_pixel(&camera, SIZE, |ray| scene.seen(ray, &sheets, BACKGROUND_F64));
@@ -276,7 +284,7 @@ pub fn colours_stay_within_what_is_emitted(backend: &mut dyn Backend) {
             scene.light = Some(Light { toward: [0.6, 0.0, 0.8], ambient: 0.4, diffuse: 0.7 });
         }
         for i in 0..7 {
-            let [thickness, tilt] = [random.next() - 0.5, random.next() - 0.5];
+            let [thickness, tilt] = [0.4 * (random.next() - 0.5), random.next() - 0.5];
             let value = |place: DVec3| 0.5 + tilt * place.x;
             scene.add_square(DVec3::Z * (0.1 * f64::from(i)), 50.0, 3, thickness as f32, &mut random, value);
         }

@@ -125,7 +125,8 @@ fn grids_too_flat_too_fine_or_too_far_are_refused_with_their_numbers() {
         points: unit_cell(Hexahedron).into_iter().map(|point| low + size * point).collect(),
         cells: vec![(Hexahedron, (0..8).collect())],
     };
-    let planes = |parts: &Parts, count| Planes::over(&parts.grid(), DVec3::Z, count).map_err(|e| e.to_string());
+    let planes =
+        |parts: &Parts, count| Planes::over(&parts.grid(), DVec3::Z, count).map_err(|e| e.to_string());
     let flat = planes(&box_of(DVec3::splat(3.0), DVec3::new(1.0, 1.0, 0.0)), 3).unwrap_err();
     assert!(flat.contains("flat along") && flat.contains("at 3,"), "{flat}");
     // An extent of eight steps of what 64 bits hold there.
