@@ -10,7 +10,8 @@
 //! The thickness is an affine function of the place along the normal: constant for the plane of a slice. Triangles
 //! between two planes with a slope of 1 or -1 stand for what slabs of constant thickness have too much or too little
 //! where the domain ends between planes: their thickness has a sign. With it a stack is of second order up to its
-//! outline, without it of first (where colour and extinction have no steps). Their optical depths count up to [`MAX_STRIP_DEPTH`].
+//! outline, without it of first (where colour and extinction have no steps). Optical depths of strips count up to
+//! [`MAX_STRIP_DEPTH`], to either side.
 //!
 //! Where what is taken away lies in matter of another colour or extinction than the slab that had too much, a sum of
 //! signed sheets can be darker than black. What matter can show is a mixture of its colours and of what is behind, so
@@ -170,8 +171,9 @@ impl Sheet {
     }
 }
 
-/// No optical depth is below minus this, and none of a strip above it. So what comes in and goes out at one place cancels, however dense it is, and matter behind an outline
-/// is off by 1/150 at most; rounding grows 150 times between what is taken away and where it was too much.
+/// No optical depth is below minus this, and none of a strip above it. So what comes in and goes out at one place
+/// cancels, however dense it is, and what a strip alone stands for is off by 1/150 in opacity at most. Rounding grows
+/// 150 times between what is taken away and where it was too much.
 pub const MAX_STRIP_DEPTH: f32 = 5.0;
 
 /// A light far away that lights both sides: `color * (ambient + diffuse * |direction . toward|)`, with the direction

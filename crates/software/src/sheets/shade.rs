@@ -57,13 +57,13 @@ impl Shading<'_> {
                 places[lane] = fragments.pixels[start + lane] as usize % NUM_PIXELS;
                 obliquities[lane] = self.obliquities[places[lane]];
                 if fragments.pixels[start + lane] >= STRIP {
-                    most[lane] = strip_depth();
+                    most[lane] = MAX_STRIP_DEPTH;
                 }
             }
             let lengths = f32x16::from_slice(simd, attribute(1)) * f32x16::from_slice(simd, &obliquities);
             let depth = lengths * f32x16::from_slice(simd, &entries.extinctions);
             let depth = depth.min(f32x16::from_slice(simd, &most));
-            let opacity = opacity_of_depth(simd, depth.max(f32x16::splat(simd, -strip_depth())));
+            let opacity = opacity_of_depth(simd, depth.max(f32x16::splat(simd, -MAX_STRIP_DEPTH)));
             let opacities: [f32; 16] = opacity.into();
             for lane in 0..(fragments.len - start).min(16) {
                 let pixel = &mut pixels[places[lane]];
@@ -155,9 +155,4 @@ impl Entries {
             *color = [r * shade, g * shade, b * shade, minus_one];
         }
     }
-}
-
-fn strip_depth() -> f32 {
-    static M: std::sync::OnceLock<f32> = std::sync::OnceLock::new();
-    *M.get_or_init(|| std::env::var("STRIPM").ok().and_then(|x| x.parse().ok()).unwrap_or(MAX_STRIP_DEPTH))
 }
