@@ -1,6 +1,8 @@
 //! Validates every WGSL file with naga and writes what the Rust side must agree with: `emit` says what.
 //!
-//! A file that does not parse or validate fails the build; all such files are reported, not only the first.
+//! A file that does not parse or validate fails the build; all such files are reported, not only the first. A line
+//! `// import NAME` adds the file `parts/NAME.wgsl` behind the shader: order means nothing in WGSL, and lines keep their
+//! numbers.
 
 mod emit;
 
@@ -15,6 +17,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 struct Shader {
     /// File name without its extension; the name of the Rust module.
     name: String,
+    /// Its text with all parts.
     path: PathBuf,
     module: naga::Module,
     info: naga::valid::ModuleInfo,
@@ -77,12 +80,28 @@ fn name_of(path: &Path) -> Result<String, String> {
 
 fn load(path: &Path) -> Result<Shader, String> {
     let shown = path.display().to_string();
-    let source = fs::read_to_string(path).map_err(|e| format!("{shown}: {e}"))?;
+    let source = with_parts(path)?;
     let module =
         naga::front::wgsl::parse_str(&source).map_err(|e| e.emit_to_string_with_path(&source, &shown))?;
     // Without capabilities: what every device has.
     let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
         .validate(&module)
         .map_err(|e| e.emit_to_string_with_path(&source, &shown))?;
-    Ok(Shader { name: name_of(path)?, path: path.to_owned(), module, info })
+    let name = name_of(path)?;
+    let path = Path::new(&env::var("OUT_DIR").map_err(|e| e.to_string())?).join(format!("{name}.wgsl"));
+    fs::write(&path, source).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(Shader { name, path, module, info })
+}
+
+/// The text of a shader and of the parts that it imports.
+fn with_parts(path: &Path) -> Result<String, String> {
+    let read = |path: &Path| fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()));
+    let mut source = read(path)?;
+    let names: Vec<_> =
+        source.lines().filter_map(|line| line.strip_prefix("// import ")).map(str::to_owned).collect();
+    for name in names {
+        source.push('\n');
+        source += &read(&path.with_file_name("parts").join(format!("{name}.wgsl")))?;
+    }
+    Ok(source)
 }

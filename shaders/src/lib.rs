@@ -8,7 +8,7 @@
 //!
 //! # Non-goals
 //! No wgpu: [`Binding`] says in words of its own what a resource is, and who executes shaders makes layouts
-//! of that. No preprocessor: no two shaders share code yet.
+//! of that. No preprocessor but `// import NAME`, which adds `src/wgsl/parts/NAME.wgsl`.
 
 /// A resource that a shader binds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use volery::glam::DVec3;
 use volery::output::write_image;
 use volery::{
-    Camera, Focus, Image, Picture, Plane, Projection, Sampling, Session, Technique, View, ViewOptions,
-    VoxelGrid,
+    Backend, Camera, Focus, Image, Picture, Plane, Projection, Sampling, Session, Technique, View,
+    ViewOptions, VoxelGrid,
 };
 use volery_reference::metrics::{Comparison, compare};
 use volery_software::SoftwareBackend;

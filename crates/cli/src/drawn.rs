@@ -38,7 +38,7 @@ macro_rules! drawn {
             }
 
             fn has_colors(&self) -> bool {
-                #[expect(clippy::redundant_closure_call, reason = "of two of the three it is a constant")]
+                #[allow(clippy::redundant_closure_call, reason = "of two of the three it is a constant")]
                 ($has_colors)(self)
             }
         }

@@ -26,7 +26,8 @@ pub(crate) fn check(
     let corner = |corner: DVec3| corner.to_array().map(number).join(", ");
     let place = || format!("lies from {} to {}", corner(low), corner(high));
     let size = (high - low).max_element();
-    if !(size < LONGEST) || !(low.abs().max(high.abs()).max_element() < LONGEST) {
+    let farthest = low.abs().max(high.abs()).max_element();
+    if [size, farthest].iter().any(|length| length.is_nan() || *length >= LONGEST) {
         let problem = format!("{}, expected places within 1e150 of the origin", place());
         return Err(Failure::of_file(path, problem));
     }

@@ -135,6 +135,9 @@ fn is_slice(name: &OsStr) -> bool {
     ending.is_some_and(|ending| ["png", "tif", "tiff"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
+/// Whether a folder gets a file of a name.
+type IsWritten = fn(&OsStr) -> bool;
+
 /// A place that may be written, and who asks for it.
 struct Written {
     option: &'static str,
@@ -142,7 +145,7 @@ struct Written {
     /// `None` where there is nothing to lose.
     place: Option<Place>,
     /// A folder, and the names of new files in it.
-    folder: Option<(PathBuf, fn(&OsStr) -> bool)>,
+    folder: Option<(PathBuf, IsWritten)>,
 }
 
 impl Written {

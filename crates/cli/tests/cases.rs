@@ -14,12 +14,12 @@ fn cube(value: impl Fn(f64, f64) -> i16) -> VoxelGrid {
             value((x * x + y * y + z * z).sqrt(), (x * x + y * y).sqrt())
         })
         .collect();
-    VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).unwrap()
+    VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).expect("a cube of samples")
 }
 
 /// How many pixels of a picture are not background.
 fn num_seen(shop: &Workshop, name: &str) -> usize {
-    let picture = volery::io::read_png_rgb(&shop.path(name)).unwrap();
+    let picture = volery::io::read_png_rgb(&shop.path(name)).expect("a picture that was drawn");
     let background = picture.pixels[0];
     picture.pixels.iter().filter(|pixel| (0..3).any(|c| (pixel[c] - background[c]).abs() > 0.02)).count()
 }
@@ -58,7 +58,10 @@ fn c1_render_ct_shows_the_ball_and_not_its_padding() {
                 if from_axis > 11.0 { padding } else { ball((from_axis * from_axis + z * z).sqrt()) + noise }
             })
             .collect();
-        shop.write_volume(&name, &VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).unwrap());
+        shop.write_volume(
+            &name,
+            &VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).expect("a cube of samples"),
+        );
         shop.done(&format!("render {name} -o a.png --size 64x64"));
         let seen = num_seen(&shop, "a.png");
         assert!(seen.abs_diff(plain) < plain / 4, "padding of {padding}: {seen} pixels, {plain} of the ball");
@@ -81,7 +84,10 @@ fn c1_outliers_do_not_take_the_colours() {
             .collect()
     };
     let colors = |name: &str, samples: Vec<f32>| {
-        shop.write_volume(name, &VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).unwrap());
+        shop.write_volume(
+            name,
+            &VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).expect("a cube of samples"),
+        );
         shop.done(&format!("render {name} -o {name}.png --size 64x64 --report {name}.json"));
         let points = shop.json(&format!("{name}.json"))["transfer_function"]["points"].clone();
         let value = |point: &serde_json::Value| point["value"].as_f64().unwrap();
@@ -111,7 +117,10 @@ fn c1_outliers_do_not_take_the_colours() {
     };
     let seen = [false, true].map(|hot| {
         let samples: Vec<u16> = (0..24 * 24 * 24).map(|i| dim(i, hot)).collect();
-        shop.write_volume("hot16.nrrd", &VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).unwrap());
+        shop.write_volume(
+            "hot16.nrrd",
+            &VoxelGrid::new([24, 24, 24], DVec3::ONE, samples).expect("a cube of samples"),
+        );
         shop.done("render hot16.nrrd -o a.png --size 64x64");
         num_seen(&shop, "a.png")
     });

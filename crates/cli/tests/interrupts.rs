@@ -1,5 +1,6 @@
 //! Ended at any moment, the program leaves whole files or none, and its inputs as they were.
 #![cfg(unix)]
+#![allow(clippy::disallowed_methods, reason = "that a signal comes at any moment is what is tested")]
 
 mod common;
 
@@ -18,20 +19,20 @@ fn start(shop: &Workshop, line: &str) -> Child {
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
-        .unwrap()
+        .expect("a folder and a program")
 }
 
 fn end(child: &mut Child, signal: &str) {
     let status = Command::new("kill").args([signal, &child.id().to_string()]).stderr(Stdio::null()).status();
     // It may have ended by itself.
-    status.unwrap();
-    child.wait().unwrap();
+    status.expect("a folder and a program");
+    child.wait().expect("a folder and a program");
 }
 
 /// Whether bytes are a whole file of what their name says.
 fn is_whole(shop: &Workshop, name: &str) -> bool {
     let bytes = shop.bytes(name);
-    match name.rsplit('.').next().unwrap() {
+    match name.rsplit('.').next().expect("a folder and a program") {
         "png" => volery::io::read_png_rgb(&shop.path(name)).is_ok(),
         "json" => serde_json::from_slice::<serde_json::Value>(&bytes).is_ok() && bytes.ends_with(b"}\n"),
         "vsl" | "glb" => volery::io::read_stack(&shop.path(name), 1 << 30).is_ok(),
@@ -48,7 +49,8 @@ fn check(line: &str, outputs: &[&str]) {
     shop.done(line);
     let whole_run = start_time.elapsed();
     for name in outputs.iter().filter(|name| name.ends_with(".exr")) {
-        std::fs::copy(shop.path(name), shop.path(format!("reference-{name}"))).unwrap();
+        std::fs::copy(shop.path(name), shop.path(format!("reference-{name}")))
+            .expect("a folder and a program");
     }
     let inputs = ["waves.nrrd", "ring.vtk"].map(|name| (name, shop.bytes(name)));
     let known = shop.names();
@@ -64,7 +66,7 @@ fn check(line: &str, outputs: &[&str]) {
         }
         let mut child = start(&shop, line);
         std::thread::sleep(moment.min(Duration::from_secs(20)));
-        num_ended_early += u32::from(child.try_wait().unwrap().is_none());
+        num_ended_early += u32::from(child.try_wait().expect("a folder and a program").is_none());
         end(&mut child, ["-KILL", "-TERM", "-INT"][number % 3]);
         for name in shop.names() {
             assert!(known.contains(&name), "{line}: {name} was left after {moment:?}");
@@ -106,8 +108,10 @@ fn pictures_on_the_way() {
     shop.done(line);
     let whole_run = start_time.elapsed();
     let folder = |shop: &Workshop| {
-        let entries = std::fs::read_dir(shop.path("steps")).unwrap();
-        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let entries = std::fs::read_dir(shop.path("steps")).expect("a folder and a program");
+        let names = entries.map(|entry| {
+            entry.expect("a folder and a program").file_name().into_string().expect("a folder and a program")
+        });
         let mut names: Vec<_> = names.map(|name| format!("steps/{name}")).collect();
         names.sort();
         names
@@ -131,10 +135,13 @@ fn an_interrupt_ends_the_program_as_the_signal_says() {
         let mut child =
             start(&shop, "render waves.nrrd --size 2000x2000 --backend software --verify -o a.png");
         std::thread::sleep(Duration::from_millis(300));
-        assert!(child.try_wait().unwrap().is_none(), "it takes longer than that");
-        let sent = Command::new("kill").args([name, &child.id().to_string()]).status().unwrap();
+        assert!(child.try_wait().expect("a folder and a program").is_none(), "it takes longer than that");
+        let sent = Command::new("kill")
+            .args([name, &child.id().to_string()])
+            .status()
+            .expect("a folder and a program");
         assert!(sent.success());
-        assert_eq!(child.wait().unwrap().signal(), Some(number));
+        assert_eq!(child.wait().expect("a folder and a program").signal(), Some(number));
     }
     // What was told to ignore a signal goes on.
     let script = format!(
@@ -144,6 +151,6 @@ fn an_interrupt_ends_the_program_as_the_signal_says() {
     );
     let status =
         Command::new("sh").args(["-c", &script]).current_dir(shop.path("")).stdout(Stdio::null()).status();
-    assert!(status.unwrap().success());
+    assert!(status.expect("a folder and a program").success());
     assert!(is_whole(&shop, "b.png"));
 }

@@ -12,9 +12,9 @@ use common::{Workshop, legacy_grid, scene_json};
 /// Every file of a folder and what is in it, folders in it too; links as what they lead to.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    for entry in std::fs::read_dir(folder).expect("a folder to write in") {
+        let path = entry.expect("a folder to write in").path();
+        let name = path.file_name().expect("a folder to write in").to_string_lossy().into_owned();
         if path.is_dir() {
             found
                 .extend(contents(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
@@ -32,7 +32,7 @@ fn refused(shop: &Workshop, line: &str, words: &[&str]) {
     let before = contents(&shop.path(""));
     let outcome = shop.run_line(line);
     assert!(matches!(outcome.code, Some(1 | 2)), "volery {line}: {:?} {}", outcome.code, outcome.stdout);
-    outcome.fails(outcome.code.unwrap(), words);
+    outcome.fails(outcome.code.expect("a folder to write in"), words);
     assert!(contents(&shop.path("")) == before, "volery {line} changed something");
 }
 
@@ -57,9 +57,9 @@ fn workshop() -> Workshop {
         "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"ring.vtk\"/>\
          <DataSet timestep=\"1\" file=\"late.vtk\"/></Collection></VTKFile>",
     );
-    std::fs::create_dir(shop.path("slices")).unwrap();
+    std::fs::create_dir(shop.path("slices")).expect("a folder to write in");
     for name in ["slices/00.png", "slices/01.png"] {
-        volery::io::write_png(&shop.path(name), 5, 4, &[[0.5, 0.2, 0.1]; 20]).unwrap();
+        volery::io::write_png(&shop.path(name), 5, 4, &[[0.5, 0.2, 0.1]; 20]).expect("a folder to write in");
     }
     shop
 }

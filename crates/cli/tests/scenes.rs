@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 
 fn workshop() -> Workshop {
     let shop = Workshop::new();
-    std::fs::create_dir_all(shop.path("data")).unwrap();
-    std::fs::create_dir_all(shop.path("saved/here")).unwrap();
+    std::fs::create_dir_all(shop.path("data")).expect("a saved scene that is whole");
+    std::fs::create_dir_all(shop.path("saved/here")).expect("a saved scene that is whole");
     shop.write_volume("data/head.nrrd", &head());
     shop.write("data/cells.vtk", legacy_grid(1.0, usize::MAX));
     shop.write("data/samples.bin", (0..=255).cycle().take(12 * 10 * 9 * 2).collect::<Vec<u8>>());
@@ -26,7 +26,7 @@ fn workshop() -> Workshop {
         .to_string(),
     );
     let pixels: Vec<_> = (0..60).map(|i| [i as f32 / 60.0, 0.5, 1.0 - i as f32 / 60.0]).collect();
-    volery::io::write_png(&shop.path("image.png"), 10, 6, &pixels).unwrap();
+    volery::io::write_png(&shop.path("image.png"), 10, 6, &pixels).expect("a saved scene that is whole");
     shop.done("slice data/cells.vtk -o data/cells.vsl --count 20 --axis 0.3,0.5,0.81");
     shop
 }
@@ -82,9 +82,10 @@ fn a_saved_scene_remakes_the_picture_bit_for_bit() {
     assert!(pictures.len() >= LINES.len() - 1, "{} different pictures", pictures.len());
     // A scene moves together with its files.
     shop.done("render waves.nrrd --size 20x20 -o a.exr --save-scene s.json");
-    std::fs::create_dir(shop.path("moved")).unwrap();
+    std::fs::create_dir(shop.path("moved")).expect("a saved scene that is whole");
     for name in ["s.json", "waves.nrrd"] {
-        std::fs::rename(shop.path(name), shop.path(format!("moved/{name}"))).unwrap();
+        std::fs::rename(shop.path(name), shop.path(format!("moved/{name}")))
+            .expect("a saved scene that is whole");
     }
     shop.done("render moved/s.json -o b.exr");
     assert!(shop.bytes("a.exr") == shop.bytes("b.exr"));
@@ -122,10 +123,10 @@ fn the_report_says_what_was_drawn_of_what() {
     );
     let files: Vec<_> = report["inputs"]
         .as_array()
-        .unwrap()
+        .expect("a saved scene that is whole")
         .iter()
         .map(|file| {
-            let path = file["path"].as_str().unwrap();
+            let path = file["path"].as_str().expect("a saved scene that is whole");
             assert_eq!(file["bytes"].as_u64(), Some(shop.bytes(path).len() as u64), "{path}");
             path
         })
@@ -140,7 +141,7 @@ struct Schema(Value);
 
 fn schema() -> Schema {
     let text = include_str!("../../../docs/scene.schema.json");
-    Schema(serde_json::from_str(text).unwrap())
+    Schema(serde_json::from_str(text).expect("a keyword as schemas have it"))
 }
 
 impl Schema {
@@ -151,16 +152,25 @@ impl Schema {
     }
 
     fn check(&self, schema: &Value, value: &Value, place: &str, defects: &mut Vec<String>) {
-        for (keyword, rule) in schema.as_object().unwrap() {
-            let number = || rule.as_f64().unwrap();
+        for (keyword, rule) in schema.as_object().expect("a keyword as schemas have it") {
+            let number = || rule.as_f64().expect("a keyword as schemas have it");
             let is_right = match keyword.as_str() {
                 "$schema" | "$defs" | "title" | "description" | "examples" | "default" => true,
                 "$ref" => {
-                    let target = rule.as_str().unwrap().strip_prefix('#').unwrap();
-                    self.check(self.0.pointer(target).unwrap(), value, place, defects);
+                    let target = rule
+                        .as_str()
+                        .expect("a keyword as schemas have it")
+                        .strip_prefix('#')
+                        .expect("a keyword as schemas have it");
+                    self.check(
+                        self.0.pointer(target).expect("a keyword as schemas have it"),
+                        value,
+                        place,
+                        defects,
+                    );
                     true
                 }
-                "type" => match rule.as_str().unwrap() {
+                "type" => match rule.as_str().expect("a keyword as schemas have it") {
                     "object" => value.is_object(),
                     "array" => value.is_array(),
                     "string" => value.is_string(),
@@ -169,7 +179,7 @@ impl Schema {
                     "boolean" => value.is_boolean(),
                     other => panic!("type {other}"),
                 },
-                "enum" => rule.as_array().unwrap().contains(value),
+                "enum" => rule.as_array().expect("a keyword as schemas have it").contains(value),
                 "minimum" => value.as_f64().is_none_or(|x| x >= number()),
                 "maximum" => value.as_f64().is_none_or(|x| x <= number()),
                 "exclusiveMinimum" => value.as_f64().is_none_or(|x| x > number()),
@@ -177,8 +187,10 @@ impl Schema {
                 "minItems" => value.as_array().is_none_or(|list| list.len() as f64 >= number()),
                 "maxItems" => value.as_array().is_none_or(|list| list.len() as f64 <= number()),
                 "required" => {
-                    let has = |name: &Value| value.get(name.as_str().unwrap()).is_some();
-                    rule.as_array().unwrap().iter().all(has)
+                    let has = |name: &Value| {
+                        value.get(name.as_str().expect("a keyword as schemas have it")).is_some()
+                    };
+                    rule.as_array().expect("a keyword as schemas have it").iter().all(has)
                 }
                 "items" => {
                     for item in value.as_array().into_iter().flatten() {
@@ -187,7 +199,7 @@ impl Schema {
                     true
                 }
                 "properties" => {
-                    for (name, rule) in rule.as_object().unwrap() {
+                    for (name, rule) in rule.as_object().expect("a keyword as schemas have it") {
                         if let Some(value) = value.get(name) {
                             self.check(rule, value, &format!("{place}.{name}"), defects);
                         }
@@ -205,7 +217,7 @@ impl Schema {
                         self.check(rule, value, place, &mut defects);
                         defects.is_empty()
                     };
-                    rule.as_array().unwrap().iter().filter(fits).count() == 1
+                    rule.as_array().expect("a keyword as schemas have it").iter().filter(fits).count() == 1
                 }
                 other => panic!("the schema has a keyword that this test does not know: {other}"),
             };
@@ -220,17 +232,22 @@ impl Schema {
 fn the_schema_and_the_parser_agree() {
     let schema = schema();
     let parse = |value: &Value| volery::io::SceneFile::parse(&value.to_string());
-    let examples = schema.0["examples"].as_array().unwrap();
+    let examples = schema.0["examples"].as_array().expect("a keyword as schemas have it");
     assert!(examples.len() >= 2);
-    let file: Value = serde_json::from_str(include_str!("../../../docs/scene.example.json")).unwrap();
+    let file: Value = serde_json::from_str(include_str!("../../../docs/scene.example.json"))
+        .expect("a keyword as schemas have it");
     for example in examples.iter().chain([&file]) {
         assert_eq!(schema.defects(example), Vec::<String>::new());
-        parse(example).unwrap();
+        parse(example).expect("a keyword as schemas have it");
     }
     // Every field in one of the examples, and each with a wrong value refused by both.
-    let fields: BTreeSet<&String> = schema.0["properties"].as_object().unwrap().keys().collect();
-    let shown: BTreeSet<&String> =
-        examples.iter().chain([&file]).flat_map(|example| example.as_object().unwrap().keys()).collect();
+    let fields: BTreeSet<&String> =
+        schema.0["properties"].as_object().expect("a keyword as schemas have it").keys().collect();
+    let shown: BTreeSet<&String> = examples
+        .iter()
+        .chain([&file])
+        .flat_map(|example| example.as_object().expect("a keyword as schemas have it").keys())
+        .collect();
     assert_eq!(fields, shown);
     let wrong =
         [json!(-3), json!([]), json!({"x": 1}), json!([1, 2, 3, 4, 5]), json!([-1, 2]), json!([2, 1, -5])];
@@ -256,7 +273,10 @@ fn the_schema_and_the_parser_agree() {
     assert_eq!(known.iter().collect::<BTreeSet<_>>(), fields);
     let unknown = parse(&json!({"input": {"file": "a", "size": 1}})).unwrap_err().to_string();
     let known: BTreeSet<String> = unknown.split('`').skip(3).step_by(2).map(str::to_owned).collect();
-    let of_input: BTreeSet<&String> =
-        schema.0["properties"]["input"]["properties"].as_object().unwrap().keys().collect();
+    let of_input: BTreeSet<&String> = schema.0["properties"]["input"]["properties"]
+        .as_object()
+        .expect("a keyword as schemas have it")
+        .keys()
+        .collect();
     assert_eq!(known.iter().collect::<BTreeSet<_>>(), of_input);
 }

@@ -30,7 +30,7 @@ fn options(shop: &Workshop, command: &str) -> Vec<Opt> {
         }
         let Some(start) = line.find("--").filter(|&start| start <= 6) else { continue };
         let mut words = line[start..].split_whitespace();
-        let name = words.next().unwrap().to_owned();
+        let name = words.next().expect("an option with a name").to_owned();
         let value = words.next().filter(|word| word.starts_with('<'));
         let value = value.map(|word| word.trim_matches(['<', '>']).to_owned());
         if name != "--help" && name != "--version" {
@@ -136,7 +136,7 @@ fn wrong_usages_are_refused_in_one_line_that_helps() {
     for (line, name) in &lines {
         let outcome = shop.run_line(line);
         assert!(matches!(outcome.code, Some(1 | 2)), "volery {line} was passed over: {}", outcome.stdout);
-        outcome.fails(outcome.code.unwrap(), &[name.trim_start_matches('-')]);
+        outcome.fails(outcome.code.expect("an option with a name"), &[name.trim_start_matches('-')]);
         let said = &outcome.stderr;
         assert!(HELPFUL.iter().any(|word| said.contains(word)), "volery {line}: {said}");
         assert!(said.len() < 500, "volery {line}: {said}");
@@ -158,7 +158,7 @@ fn what_was_meant_is_offered() {
         ("render s.json -o a.png", "did you mean viridis?"),
     ] {
         let outcome = shop.run_line(line);
-        outcome.fails(outcome.code.unwrap(), &[meant]);
+        outcome.fails(outcome.code.expect("an option with a name"), &[meant]);
     }
 }
 
@@ -169,7 +169,8 @@ fn what_a_file_cannot_answer_is_refused() {
     shop.write("ring.vtk", legacy_grid(1.0, usize::MAX));
     shop.write("v_5x4x3_uint8.raw", [7; 60]);
     shop.done("slice ring.vtk -o ring.vsl --count 8");
-    volery::io::write_png(&shop.path("image.png"), 5, 4, &[[0.5, 0.2, 0.1]; 20]).unwrap();
+    volery::io::write_png(&shop.path("image.png"), 5, 4, &[[0.5, 0.2, 0.1]; 20])
+        .expect("an option with a name");
     shop.write("t.json", common::scene_json("x")["transfer_function"].to_string());
     for (file, option) in [
         // B5: --array on files without arrays.
@@ -205,7 +206,7 @@ fn what_a_file_cannot_answer_is_refused() {
         ("waves.nrrd --shade", &["waves.nrrd", "--shade"]),
     ] {
         let outcome = shop.run_line(&format!("render {line} -o new.png --size 8x8"));
-        outcome.fails(outcome.code.unwrap(), words);
+        outcome.fails(outcome.code.expect("an option with a name"), words);
     }
     assert!(!shop.names().contains(&"new.png".to_owned()));
 }
@@ -217,7 +218,7 @@ fn an_option_that_changes_the_technique_says_so() {
         ["--focus 1,2,3", "--nearest", "--error 0.1", "--plane 0,0,1,9", "--transparent", "--show-nodes"]
     {
         let said = shop.done(&format!("render waves.nrrd -o a.png --size 9x9 {option}")).stdout;
-        let name = option.split(' ').next().unwrap();
+        let name = option.split(' ').next().expect("an option with a name");
         assert!(
             said.contains(&format!("note: drawn by --technique plane, which alone reads {name}")),
             "{said}"

@@ -46,3 +46,26 @@ pub fn chord<F: Real>(origin: [F; 3], direction: [F; 3], cuboid: &Cuboid<F>) -> 
     };
     span * length(direction)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_opposite_faces_a_far_origin_costs_no_digit() {
+        let unit = Cuboid { low: [0.0; 3], high: [1.0; 3] };
+        // The difference of the two distances along the ray would be off by 1e-4 of 1.
+        let far = 1e12;
+        for (origin, along) in [(-far, 1.0), (far, -1.0)] {
+            for axis in 0..3 {
+                let [mut from, mut way] = [[0.2, 0.3, 0.4], [3e-13, 1e-13, -2e-13]];
+                (from[axis], way[axis]) = (origin, along);
+                let found = chord(from, way, &unit);
+                assert!((found - 1.0).abs() <= 4.0 * f64::EPSILON, "axis {axis}, from {origin}: {found}");
+            }
+        }
+        let unit = Cuboid { low: [0.0; 3], high: [1.0; 3] };
+        let found: f32 = chord([-1e6, 0.2, 0.3], [1.0, 3e-7, -2e-7], &unit);
+        assert!((found - 1.0).abs() <= 4.0 * f32::EPSILON, "{found}");
+    }
+}

@@ -10,7 +10,13 @@
 //! The thickness is an affine function of the place along the normal: constant for the plane of a slice. Triangles
 //! between two planes with a slope of 1 or -1 stand for what slabs of constant thickness have too much or too little
 //! where the domain ends between planes: their thickness has a sign. With it a stack is of second order up to its
-//! outline, without it of first. An optical depth below [`MIN_DEPTH`] counts as that.
+//! outline, without it of first (where colour and extinction have no steps). Optical depths of strips count up to
+//! [`MAX_STRIP_DEPTH`], to either side.
+//!
+//! Where what is taken away lies in matter of another colour or extinction than the slab that had too much, a sum of
+//! signed sheets can be darker than black. What matter can show is a mixture of its colours and of what is behind, so
+//! a pixel's sum is taken to the nearest colour in that range, channel by channel: [`Sheets::emitted`] with what is
+//! behind. The truth lies in the range, so this takes no channel of any pixel farther from it.
 //!
 //! # Rules of coverage
 //! A pixel is its centre. Triangles that share two vertices by number share that side: a ray through it meets one of
@@ -51,6 +57,23 @@ impl Sheets<'_> {
     pub fn next_revision() -> u64 {
         static NEXT: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(1);
         NEXT.fetch_add(1, std::sync::atomic::Ordering::Relaxed)
+    }
+}
+
+impl Sheets<'_> {
+    /// The least and the largest number of each channel of the colours that this matter can emit, lit or not.
+    pub fn emitted(&self) -> [[f32; 3]; 2] {
+        // What has no direction has no shade.
+        let shades = match self.light {
+            None => [1.0; 3],
+            Some(Light { ambient, diffuse, .. }) => [1.0, ambient, ambient + diffuse],
+        };
+        let of = |channel: usize, join: fn(f32, f32) -> f32, none: f32| {
+            let colors = self.transfer.entries.iter().map(|entry| entry[channel]);
+            colors.flat_map(|color| shades.map(|shade| color * shade)).fold(none, join)
+        };
+        [(f32::min as fn(f32, f32) -> f32, f32::INFINITY), (f32::max, f32::NEG_INFINITY)]
+            .map(|(join, none)| [0, 1, 2].map(|channel| of(channel, join, none)))
     }
 }
 
@@ -141,8 +164,17 @@ pub struct Sheet {
     pub thickness: [f32; 2],
 }
 
-/// Optical depths below this are clamped to it: what matter can be taken away in front of other matter.
-pub const MIN_DEPTH: f32 = -0.5;
+impl Sheet {
+    /// Whether its thickness has a slope, and a sign.
+    pub fn is_strip(&self) -> bool {
+        self.thickness[1] != 0.0
+    }
+}
+
+/// No optical depth is below minus this, and none of a strip above it. So what comes in and goes out at one place
+/// cancels, however dense it is, and what a strip alone stands for is off by 1/150 in opacity at most. Rounding grows
+/// 150 times between what is taken away and where it was too much.
+pub const MAX_STRIP_DEPTH: f32 = 5.0;
 
 /// A light far away that lights both sides: `color * (ambient + diffuse * |direction . toward|)`, with the direction
 /// between vertices made a unit vector again.

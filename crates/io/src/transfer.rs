@@ -19,7 +19,7 @@ mod color_map;
 mod json;
 
 pub use color::ColorSpace;
-pub use color_map::{ColorMap, MAX_COLOR_ERROR, OpacityPoint};
+pub use color_map::{ColorMap, MAX_COLOR_ERROR, MAX_OPACITY_ERROR, OpacityPoint};
 pub(crate) use json::{Transfer2dJson, TransferJson};
 pub use json::{Transfer2dProblem, read_transfer_2d, write_transfer, write_transfer_2d};
 

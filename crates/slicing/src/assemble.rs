@@ -15,11 +15,14 @@ use crate::mesh::{MeshSheet, RUN, Rays, SliceMesh, ValuesError, between, check_c
 use crate::planes::Planes;
 use crate::section::Section;
 use crate::slicer::Slicer;
-use crate::stack::Stack;
+use crate::stack::{Layer, Stack};
 use crate::strips::Strips;
 
+/// How far the outline may reach from its middle: places, and what executors make of them, are 32 bits.
+const MAX_REACH: f64 = 1e30;
+
 /// Why a mesh could not be made.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The grid could not be cut.
     #[error(transparent)]
@@ -27,6 +30,12 @@ pub enum Error {
     /// Values that do not fit the grid.
     #[error(transparent)]
     Values(#[from] ValuesError),
+    /// Places too far apart for the 32 bits of a vertex.
+    #[error("slice mesh: the grid reaches {found:e} from its middle, expected at most {MAX_REACH:e}")]
+    TooFar {
+        /// Along x, y or z.
+        found: f64,
+    },
     /// More than can be numbered.
     #[error("slice mesh: {found} {what}, expected at most {}", u32::MAX)]
     TooMany {
@@ -53,6 +62,16 @@ impl Part {
 
     pub(crate) fn new(stack: Stack, strips: Strips, planes: &Planes) -> Self {
         Self { stack, strips, slab_ends: planes.slab_ends() }
+    }
+
+    /// Positions of the planes that vertices may lie on: a cell without volume has an outline, and no slice.
+    fn planes(&self, origin: f64) -> impl Iterator<Item = f64> {
+        let has_vertices = move |&(place, layer): &(usize, &Layer)| {
+            let mut beside = self.strips.gaps.iter().skip(place).take(2);
+            layer.section.is_some() || beside.any(|gap| !gap.is_empty())
+        };
+        let layers = self.stack.layers().iter().enumerate().filter(has_vertices);
+        layers.map(move |(_, layer)| layer.position - origin)
     }
 
     /// What is to be drawn, with vertices numbered from `first_vertex` on: those of sections, then those of strips.
@@ -148,7 +167,10 @@ impl Slicer {
         if u32::try_from(num_vertices).is_err() {
             return Err(Error::TooMany { what: "vertices", found: num_vertices });
         }
-        let origin = self.middle();
+        let [origin, reach] = self.middle_and_reach();
+        if reach.max_element() > MAX_REACH {
+            return Err(Error::TooFar { found: reach.max_element() });
+        }
         let num_polygons = Some(parts.iter().map(|part| part.stack.num_polygons()).sum());
         let mut mesh = SliceMesh { normal, origin, num_polygons, ..SliceMesh::default() };
         (mesh.edges, mesh.weights) = (Vec::with_capacity(num_vertices), Vec::with_capacity(num_vertices));
@@ -162,6 +184,9 @@ impl Slicer {
             mesh.edges.extend_from_slice(&part.strips.edges);
             mesh.weights.extend_from_slice(&part.strips.weights);
         }
+        mesh.planes = parts.iter().flat_map(|part| part.planes(normal.dot(origin))).collect();
+        mesh.planes.sort_by(f64::total_cmp);
+        mesh.planes.dedup();
         mesh.points = self.points(&mesh);
         mesh.set_values(values, gradients)?;
         pieces.sort_by(|a, b| a.position.total_cmp(&b.position));

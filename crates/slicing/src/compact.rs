@@ -70,7 +70,7 @@ pub enum Error {
     /// Values that do not fit the nodes, or a mesh that does not know its edges.
     #[error(transparent)]
     Values(#[from] ValuesError),
-    /// A vertex between nodes that lies on no plane of a slice.
+    /// A vertex between nodes that lies on no plane of the mesh.
     #[error("compact mesh: vertex {vertex} at {found} along the normal, expected it on a plane")]
     Plane {
         /// Its number.
@@ -120,13 +120,12 @@ impl CompactMesh {
         }
         check_numbers(mesh, points.len())?;
         check_counts(values, gradients, points.len())?;
-        let planes = planes(mesh);
-        let (vertices, numbers) = without_twins(&places(mesh, &planes)?);
+        let (vertices, numbers) = without_twins(&places(mesh)?);
         let triangles = mesh.triangles.iter().map(|triangle| triangle.map(|vertex| numbers[vertex as usize]));
         let mut compact = Self {
             normal: mesh.normal,
             origin: mesh.origin,
-            planes,
+            planes: mesh.planes.clone(),
             triangles: triangles.collect(),
             sheets: mesh.sheets.clone(),
             vertices,
@@ -320,17 +319,9 @@ fn check_sheets(sheets: &[MeshSheet], num_triangles: usize) -> Result<(), Error>
     }
 }
 
-/// Where slices are, ascending.
-fn planes(mesh: &SliceMesh) -> Vec<f64> {
-    let slices = mesh.sheets.iter().filter(|sheet| sheet.thickness[1] == 0.0);
-    let mut planes: Vec<f64> = slices.map(|sheet| sheet.position).collect();
-    planes.sort_by(f64::total_cmp);
-    planes.dedup();
-    planes
-}
-
 /// The nodes and the plane of each vertex.
-fn places(mesh: &SliceMesh, planes: &[f64]) -> Result<Vec<Place>, Error> {
+fn places(mesh: &SliceMesh) -> Result<Vec<Place>, Error> {
+    let planes = &mesh.planes;
     let dvec3 = |&[x, y, z, _]: &[f32; 4]| DVec3::new(x.into(), y.into(), z.into());
     let reach = mesh.points.par_iter().map(|point| dvec3(point).abs()).reduce(|| DVec3::ZERO, DVec3::max);
     let allowed = OFF_PLANE * mesh.normal.abs().dot(reach);

@@ -4,7 +4,8 @@
 //! A slice stands for a slab of matter, half a distance to either side. Where the grid ends between two planes, slabs
 //! have too much or too little by up to that half, an error of first order in the distance. So the outline of the grid
 //! is cut by the planes as well, and its strips carry what is missing or too much: a thickness that is an affine
-//! function of the place along the normal, negative where the slab has too much. What is left is of second order.
+//! function of the place along the normal, negative where the slab has too much. What is left is of second order, for
+//! matter that depends on the place without steps.
 //!
 //! Between two planes slabs meet in the middle `m`. A ray going up (along the normal) that leaves the grid at `x` has
 //! `x - m` more than the slabs know, one that comes in has `m - x`; going down it is the other way round. Summed over
@@ -47,6 +48,9 @@ pub struct SliceMesh {
     pub edges: Vec<[u32; 2]>,
     /// The weight of the second node of each vertex; as many as edges.
     pub weights: Vec<f32>,
+    /// Positions along the normal, from the origin of the mesh and ascending, of all planes that a vertex may lie on:
+    /// those of slices, and those that pass the outline alone. Empty for a mesh that was read from a file.
+    pub planes: Vec<f64>,
     /// Vertex numbers; those of slices around the normal, those of strips around the outward normal of the grid.
     pub triangles: Vec<[u32; 3]>,
     /// What the triangles stand for, by ascending position. Together they have every triangle once.

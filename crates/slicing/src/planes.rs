@@ -43,6 +43,28 @@ pub enum Error {
         /// How many.
         found: usize,
     },
+    /// A grid that is no thicker along the normal than rounding of its coordinates.
+    #[error(
+        "slicing planes: the grid is flat along {normal}, at {position}, expected an extent to spread planes over"
+    )]
+    Flat {
+        /// The unit normal.
+        normal: DVec3,
+        /// Where it lies.
+        position: f64,
+    },
+    /// Planes so near to one another that numbers cannot tell their positions apart.
+    #[error(
+        "slicing planes: {count} planes from {low} to {high}, expected so few that 64 bits tell their positions apart"
+    )]
+    TooFine {
+        /// How many.
+        count: usize,
+        /// Where the grid begins along the normal.
+        low: f64,
+        /// Where it ends.
+        high: f64,
+    },
     /// A grid without any cell that is not blank has no extent to spread planes over.
     #[error("slicing planes: the grid has no cell that is not blank, expected at least one")]
     NoCells,
@@ -87,8 +109,14 @@ impl Planes {
         if count > Self::MAX {
             return Err(Error::TooMany { found: count });
         }
+        if high - low == 0.0 {
+            return Err(Error::Flat { normal: unit, position: low });
+        }
         let distance = (high - low) / count.max(1) as f64;
-        let positions = (0..count).map(|plane| low + (plane as f64 + 0.5) * distance).collect();
+        let positions: Vec<f64> = (0..count).map(|plane| low + (plane as f64 + 0.5) * distance).collect();
+        if positions.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err(Error::TooFine { count, low, high });
+        }
         Self::of_unit(unit, positions, distance)
     }
 

@@ -194,6 +194,7 @@ impl QuantizedMesh {
             gradients: gradients.par_iter().with_min_len(RUN).map(gradient).collect(),
             edges: Vec::new(),
             weights: Vec::new(),
+            planes: Vec::new(),
             num_polygons: None,
             triangles: triangles.clone(),
             sheets: sheets.clone(),

@@ -9,7 +9,8 @@ use volery_scene::{Samples, for_samples};
 ///
 /// A vertex is a place on an edge of the grid: two nodes, the lower first, and the weight of the second. So
 /// polygons know nothing of values, and new values at the nodes need no new polygons. Polygons go around the
-/// plane's normal; a cell may have up to four. Polygons of neighbours share their vertices by number.
+/// plane's normal; a cell may have up to four, one that repeats nodes more. Polygons of neighbours share their
+/// vertices by number.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
     pub(crate) edges: Vec<[u32; 2]>,

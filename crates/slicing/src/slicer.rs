@@ -114,12 +114,15 @@ impl Slicer {
         self.outline.get_or_init(|| Outline::of_classes(self, 1, |_| Some(0)).pop().unwrap_or_default())
     }
 
-    /// The middle of the outline's bounds.
-    pub(crate) fn middle(&self) -> DVec3 {
+    /// The middle of the outline's bounds, and how far they reach from it.
+    pub(crate) fn middle_and_reach(&self) -> [DVec3; 2] {
         let points = self.outline().nodes.iter().map(|&node| self.grid.points()[node as usize]);
         let bounds = points.map(|point| [point; 2]);
         let bounds = bounds.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
-        bounds.map_or(DVec3::ZERO, |[low, high]| low + 0.5 * (high - low))
+        bounds.map_or([DVec3::ZERO; 2], |[low, high]| {
+            let reach = 0.5 * high - 0.5 * low;
+            [low + reach, reach]
+        })
     }
 
     pub(crate) fn num_cells(&self) -> usize {
@@ -174,8 +177,8 @@ impl Ready<'_> {
     ) {
         let inserted = self.warped & self.table.crossed(above, self.choice);
         let num_edges = self.table.edges.len();
+        let (start, first_end) = (corners.len(), ends.len());
         for polygon in self.table.case(above, self.choice).polygons() {
-            let start = corners.len();
             if inserted == 0 {
                 corners.extend(polygon.iter().map(|corner| vertex(self.edges[corner.edge()])));
             } else {
@@ -186,29 +189,54 @@ impl Ready<'_> {
                     }
                 }
             }
-            if self.is_collapsed {
-                drop_repeated(corners, start);
-            }
-            if corners.len() > start {
-                ends.push(corners.len() as u32);
-            }
+            ends.push(corners.len() as u32);
+        }
+        if self.is_collapsed {
+            without_repeated(corners, start, ends, first_end);
         }
     }
 }
 
-/// Takes out corners equal to the one before, around the polygon from `start`; all of it if fewer than three stay.
-fn drop_repeated(corners: &mut Vec<u32>, start: usize) {
-    let mut kept = start;
-    for at in start..corners.len() {
-        if kept == start || corners[kept - 1] != corners[at] {
-            corners[kept] = corners[at];
-            kept += 1;
+/// Puts in place of the polygons from `start` on, of a cell with repeated nodes, those around what they cover: sides
+/// that are passed both ways go, the rest is followed from side to side, and split where it comes to a vertex again.
+fn without_repeated(corners: &mut Vec<u32>, start: usize, ends: &mut Vec<u32>, first_end: usize) {
+    let mut sides: Vec<[u32; 2]> = Vec::with_capacity(corners.len() - start);
+    let mut first = start;
+    for end in ends.drain(first_end..) {
+        let polygon = &corners[first..end as usize];
+        for (at, &from) in polygon.iter().enumerate() {
+            let to = polygon[(at + 1) % polygon.len()];
+            match sides.iter().position(|&side| side == [to, from]) {
+                Some(back) => drop(sides.remove(back)),
+                None if from != to => sides.push([from, to]),
+                None => {}
+            }
+        }
+        first = end as usize;
+    }
+    corners.truncate(start);
+    let mut keep = |part: &[u32]| {
+        if part.len() >= 3 {
+            corners.extend_from_slice(part);
+            ends.push(corners.len() as u32);
+        }
+    };
+    let mut path: Vec<u32> = Vec::with_capacity(sides.len());
+    while !sides.is_empty() {
+        // As many sides come to a vertex as go from it, so a path ends where it began.
+        let next = path.last().and_then(|&at| sides.iter().position(|side| side[0] == at));
+        let [from, to] = sides.remove(next.unwrap_or(0));
+        if path.is_empty() {
+            path.push(from);
+        }
+        match path.iter().position(|&other| other == to) {
+            Some(first) => {
+                keep(&path[first..]);
+                path.truncate(if first == 0 { 0 } else { first + 1 });
+            }
+            None => path.push(to),
         }
     }
-    while kept > start + 1 && corners[kept - 1] == corners[start] {
-        kept -= 1;
-    }
-    corners.truncate(if kept < start + 3 { start } else { kept });
 }
 
 impl Cell {

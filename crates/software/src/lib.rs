@@ -57,8 +57,8 @@ mod walk;
 use fearless_simd::Level;
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, RayDoubt, UploadError,
-    VolumeLayout,
+    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, RayDoubt,
+    UploadError, VolumeLayout,
 };
 
 use crate::pool::{Pool, for_bricks};

@@ -28,7 +28,7 @@ use std::borrow::Cow;
 
 use fearless_simd::{Level, dispatch, prelude::*};
 use rayon::prelude::*;
-use volery_frame::sheets::MIN_DEPTH;
+use volery_frame::sheets::MAX_STRIP_DEPTH;
 use volery_frame::{Frame, Quantization, SheetVertices, Sheets};
 
 use crate::MIN_TRANSMITTANCE;
@@ -66,6 +66,8 @@ struct Scene<'a> {
     vertices: Vec<Vertex>,
     view: View,
     table: Table,
+    /// See [`Sheets::emitted`].
+    emitted: [[f32; 3]; 2],
 }
 
 /// Draws a checked frame.
@@ -88,7 +90,8 @@ pub(crate) fn draw(
         (false, None) => 3,
         (false, Some(_)) => 6,
     };
-    let scene = Scene { content, surfaces, points, gradients, vertices, view, table };
+    let emitted = content.emitted();
+    let scene = Scene { content, surfaces, points, gradients, vertices, view, table, emitted };
     let bins = Bins::new(level, &scene);
     match num_attributes {
         2 => draw_tiles::<2>(level, frame, &scene, &bins),
@@ -175,8 +178,16 @@ fn draw_tile<S: Simd, const N: usize>(
         }
     }
     shading.composite(simd, &mut fragments, &mut pixels);
-    let pixels = pixels.iter().zip(behind);
-    pixels.map(|(pixel, behind)| [0, 1, 2].map(|i| pixel[i] + pixel[3] * behind[i])).collect()
+    let [low, high] = scene.emitted;
+    let color = |(pixel, behind): (&[f32; 4], [f32; 3])| {
+        let within = |i: usize| {
+            let sum = pixel[i] + pixel[3] * behind[i];
+            // `max` takes the other where the sum is NaN.
+            sum.max(low[i].min(behind[i])).min(high[i].max(behind[i]))
+        };
+        [0, 1, 2].map(within)
+    };
+    pixels.iter().zip(behind).map(color).collect()
 }
 
 /// The blocks that a triangle's pixels may be in.
@@ -242,7 +253,8 @@ impl Scene<'_> {
                 }
             }
         }
-        Triangle::new(vertices, attributes, first, self.view.is_perspective)
+        let is_strip = self.content.sheets[entry.sheet as usize].is_strip();
+        Triangle::new(vertices, attributes, first, (self.view.is_perspective, is_strip))
     }
 
     /// The triangle of an entry in space.
@@ -251,7 +263,7 @@ impl Scene<'_> {
             let [x, y, z, _] = self.points[vertex as usize].map(f64::from);
             glam::DVec3::new(x, y, z)
         });
-        Placed { corners, is_slab: self.content.sheets[entry.sheet as usize].thickness[1] == 0.0 }
+        Placed { corners, is_slab: !self.content.sheets[entry.sheet as usize].is_strip() }
     }
 
     /// The transmittance of each block at which nothing behind can show.
@@ -267,7 +279,7 @@ impl Scene<'_> {
             let numbers = self.content.triangles[entry.triangle as usize];
             let least =
                 numbers.map(|vertex| self.thickness(entry.sheet, vertex)).into_iter().fold(0.0, f32::min);
-            let rise = (-least * obliquity * self.table.max_extinction).min(-MIN_DEPTH);
+            let rise = (-least * obliquity * self.table.max_extinction).min(MAX_STRIP_DEPTH);
             let blocks = blocks(entry);
             (0..16).filter(|block| blocks >> block & 1 == 1).for_each(|block| rises[block] += rise);
         }

@@ -240,15 +240,7 @@ impl<'a, S: Simd> Walker<'a, S> {
             #[inline(always)]
             |axis| span.direction[axis].simd_gt(zero),
         );
-        Self {
-            span,
-            forward,
-            cells,
-            block: matter.block as f32,
-            cell,
-            depth: zero,
-            active: span.active,
-        }
+        Self { span, forward, cells, block: matter.block as f32, cell, depth: zero, active: span.active }
     }
 
     /// Depth of the plane `plane[axis]` along each axis.
@@ -415,12 +407,7 @@ impl<S: Simd> Cell<S> {
             #[inline(always)]
             |i| far[i] - near[i],
         );
-        [
-            a.mul_add(z, near[0]),
-            b.mul_add(z, near[1]) + a * dz,
-            c.mul_add(z, near[2]) + b * dz,
-            c * dz,
-        ]
+        [a.mul_add(z, near[0]), b.mul_add(z, near[1]) + a * dz, c.mul_add(z, near[2]) + b * dz, c * dz]
     }
 
     /// The least and the greatest texel.
@@ -454,6 +441,71 @@ fn balanced<S: Simd>(first: f32x16<S>, middle: f32x16<S>, last: f32x16<S>) -> f3
     let moved = (middle * 8.0 - first - last) * (1.0 / 6.0);
     let one_way = middle.simd_ge(low) & middle.simd_le(high);
     one_way.select(moved.max(low).min(high), middle)
+}
+
+/// The way of the lanes through their cells: from where they stand to `end`, in unit lengths, `half` of it, and the texel
+/// at its start, in its middle and at its end.
+struct Stretch<S: Simd> {
+    end: f32x16<S>,
+    half: f32x16<S>,
+    values: [f32x16<S>; 3],
+}
+
+/// Adds the light of one cell per lane in `lanes`, exactly in `exact` and where it must be; returns what the next cell
+/// begins with.
+#[inline(always)]
+fn add_cell<S: Simd>(
+    simd: S,
+    table: Table<'_>,
+    (walker, cell, stretch): (&Walker<'_, S>, &Cell<S>, &Stretch<S>),
+    mut from: End<S>,
+    [lanes, exact]: [mask32x16<S>; 2],
+    light: &mut Light<S>,
+) -> End<S> {
+    let zero = f32x16::splat(simd, 0.0);
+    let Stretch { end, half, values: [first, middle, last] } = *stretch;
+    let bend = (middle + middle - first - last).abs();
+    let twist = (cell.twist() * walker.volume(half)).abs();
+    let doubt = (bend * (1.0 / 6.0) + twist * (1.0 / 16.0)) * (table.slope * half) * light.transmittance;
+    let mut exact = exact | (lanes & doubt.simd_gt(4.0 * MAX_DOUBT));
+    let near;
+    let mut far = None;
+    let (mut doubt, mut color_doubt) = (doubt, zero);
+    if (lanes & !exact & doubt.simd_gt(MAX_DOUBT)).any_true() {
+        let quarter = half * 0.5;
+        let early = cell.value(walker.fraction(simd, walker.depth + quarter));
+        let late = cell.value(walker.fraction(simd, end - quarter));
+        near = Pair::new(simd, table, from, balanced(first, early, middle), middle, quarter);
+        let pair = Pair::new(simd, table, near.end, balanced(middle, late, last), last, quarter);
+        color_doubt = pair.doubt();
+        doubt *= 0.25;
+        from = pair.end;
+        far = Some(pair.pieces);
+    } else {
+        near = Pair::new(simd, table, from, balanced(first, middle, last), last, half);
+        from = near.end;
+    }
+    let behind = light.transmittance;
+    color_doubt = (color_doubt + near.doubt()) * behind;
+    exact |= lanes & color_doubt.simd_gt(MAX_DOUBT);
+    let read = lanes & !exact;
+    light.doubt += read.select(doubt + color_doubt, zero);
+    light.table_way += read.select(behind * (half + half), zero);
+    if exact.any_true() {
+        let [from, to] = [walker.depth, end].map(
+            #[inline(always)]
+            |depth| walker.fraction(simd, depth),
+        );
+        let (cubic, range, length) = (cell.along(from, to), cell.range(), half + half);
+        let field = Field { cubic, ends: [first, last], range, length };
+        add_cells(simd, table.bands, &field, exact, light);
+        light.doubt += (behind - light.transmittance) * EXACT_DOUBT;
+    }
+    light.add(simd, &near.pieces, read);
+    if let Some(pieces) = far {
+        light.add(simd, &pieces, read);
+    }
+    from
 }
 
 /// Adds the light of one brick to a packet.
@@ -519,50 +571,12 @@ pub(crate) fn walk<S: Simd, T: Texel>(
             from.bin = blank.select(zero, from.bin);
         }
         let lanes = walker.active & !blank;
-        let bend = (middle + middle - first - last).abs();
-        let twist = (cell.twist() * walker.volume(half)).abs();
-        let doubt = (bend * (1.0 / 6.0) + twist * (1.0 / 16.0)) * (table.slope * half) * light.transmittance;
-        let mut exact = lanes & doubt.simd_gt(4.0 * MAX_DOUBT);
+        let mut exact = mask32x16::splat(simd, false);
         if let Some(blocks) = matter.exact {
-            exact |= lanes & walker.in_block(simd, blocks);
+            exact = lanes & walker.in_block(simd, blocks);
         }
-        let near;
-        let mut far = None;
-        let (mut doubt, mut color_doubt) = (doubt, zero);
-        if (lanes & !exact & doubt.simd_gt(MAX_DOUBT)).any_true() {
-            let quarter = half * 0.5;
-            let early = cell.value(walker.fraction(simd, walker.depth + quarter));
-            let late = cell.value(walker.fraction(simd, end - quarter));
-            near = Pair::new(simd, table, from, balanced(first, early, middle), middle, quarter);
-            let pair = Pair::new(simd, table, near.end, balanced(middle, late, last), last, quarter);
-            color_doubt = pair.doubt();
-            doubt *= 0.25;
-            from = pair.end;
-            far = Some(pair.pieces);
-        } else {
-            near = Pair::new(simd, table, from, balanced(first, middle, last), last, half);
-            from = near.end;
-        }
-        let behind = light.transmittance;
-        color_doubt = (color_doubt + near.doubt()) * behind;
-        exact |= lanes & color_doubt.simd_gt(MAX_DOUBT);
-        let read = lanes & !exact;
-        light.doubt += read.select(doubt + color_doubt, zero);
-        light.table_way += read.select(behind * (half + half), zero);
-        if exact.any_true() {
-            let [from, to] = [walker.depth, end].map(
-                #[inline(always)]
-                |depth| walker.fraction(simd, depth),
-            );
-            let (cubic, range, length) = (cell.along(from, to), cell.range(), half + half);
-            let field = Field { cubic, ends: [first, last], range, length };
-            add_cells(simd, table.bands, &field, exact, light);
-            light.doubt += (behind - light.transmittance) * EXACT_DOUBT;
-        }
-        light.add(simd, &near.pieces, read);
-        if let Some(pieces) = far {
-            light.add(simd, &pieces, read);
-        }
+        let stretch = Stretch { end, half, values: [first, middle, last] };
+        from = add_cell(simd, table, (&walker, &cell, &stretch), from, [lanes, exact], light);
         first = last;
         // Who was blank finds its value again.
         fresh = blank;

@@ -62,6 +62,10 @@ impl Shape {
     fn new(grid: Arc<UnstructuredGrid>) -> Result<Self, OpenError> {
         let start = Instant::now();
         let world_bounds = grid.world_bounds().ok_or(OpenError::Blank)?;
+        let longest = (world_bounds[1] - world_bounds[0]).max_element();
+        if !(longest > 0.0 && longest <= OpenError::MAX_EXTENT) {
+            return Err(OpenError::Extent { bounds: world_bounds });
+        }
         let slicer = Slicer::new(grid)?;
         Ok(Self { slicer, world_bounds, build_seconds: start.elapsed().as_secs_f64() })
     }

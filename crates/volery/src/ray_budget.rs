@@ -38,10 +38,10 @@ impl RayBudget {
     pub(crate) fn new(transfer: &RayTransfer, layout: &VolumeLayout, doubt: RayDoubt) -> Self {
         let (bands, [bins_per_texel, _]) = (transfer.bands(), transfer.bin_from_texel());
         let inner = &bands[1..bands.len() - 1];
-        let is_seen = |band: &&volery_frame::ray_transfer::Band| {
-            band.opacity > 0.0 || band.opacity_slope != 0.0
-        };
-        let narrowest = inner.iter().filter(is_seen).map(|band| f64::from(band.high)).fold(f64::INFINITY, f64::min);
+        let is_seen =
+            |band: &&volery_frame::ray_transfer::Band| band.opacity > 0.0 || band.opacity_slope != 0.0;
+        let narrowest =
+            inner.iter().filter(is_seen).map(|band| f64::from(band.high)).fold(f64::INFINITY, f64::min);
         let window = (transfer.entries().len() as f64) / bins_per_texel;
         // What a rounding of the largest texels in the window is to the narrowest band.
         let rounding = 0.37 * f64::from(f32::EPSILON) / 2.0 * window / narrowest;

@@ -51,7 +51,8 @@ impl Encoding {
     /// which colour or opacity change. `range` is that of the volume.
     pub(crate) fn suiting(&self, transfer: &TransferFunction, range: [f64; 2]) -> Self {
         let points = transfer.points();
-        let [low, high] = [points[0].value, points[points.len() - 1].value].map(|x| x.clamp(range[0], range[1]));
+        let [low, high] =
+            [points[0].value, points[points.len() - 1].value].map(|x| x.clamp(range[0], range[1]));
         let width = high - low;
         let reach = (low - self.offset).abs().max((high - self.offset).abs());
         if self.texel != TexelType::F32 || width <= 0.0 || reach.max(self.scale) <= MAX_WINDOW * width {

@@ -264,6 +264,16 @@ fn what_cannot_be_drawn_is_an_error() {
     assert!(matches!(open(bare.with_array("f", wide).unwrap(), None), Some(GridOpenError::TooWide { .. })));
     let none = UnstructuredGrid::new(vec![DVec3::ZERO], Cells::default()).unwrap();
     assert_eq!(open(none.with_array("f", vec![1.0]).unwrap(), None), Some(GridOpenError::Blank));
+    // A point, and a place for what is missing.
+    for (corner, expected) in [(0.0_f64, "cells from (0, 0, 0) to (0, 0, 0),"), (1e300, "to (1, 1, 1e300),")]
+    {
+        let points = [[0.0; 3], [corner.min(1.0), 0.0, 0.0], [0.0, corner.min(1.0), 0.0]];
+        let points = points.into_iter().chain([[0.0, 0.0, corner]]).map(DVec3::from_array).collect();
+        let cells = Cells::new(vec![volery_scene::CellType::Tetrahedron], vec![0, 1, 2, 3]).unwrap();
+        let grid = UnstructuredGrid::new(points, cells).unwrap().with_array("f", vec![1.0; 4]).unwrap();
+        let error = open(grid, None).unwrap().to_string();
+        assert!(error.contains(expected) && error.len() < 120, "{error}");
+    }
 
     let mut session = session_of(volery_data::cylinder(1));
     let good = session.view(&options(0.0, false));

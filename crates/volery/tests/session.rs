@@ -212,7 +212,11 @@ impl Backend for Narrow {
             assert!(bricks.contains_key(&brick.id), "{brick:?} is not resident");
         }
         let pixels = vec![[0.0; 3]; (frame.width * frame.height) as usize];
-        Ok(Drawn { image: Image { width: frame.width, height: frame.height, pixels }, device_seconds: None, ray_doubt: None })
+        Ok(Drawn {
+            image: Image { width: frame.width, height: frame.height, pixels },
+            device_seconds: None,
+            ray_doubt: None,
+        })
     }
 }
 

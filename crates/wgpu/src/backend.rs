@@ -2,8 +2,8 @@
 
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Cubes, Device, DeviceKind, DrawError, Drawn, Frame, Image,
-    PlacedBrick, Planes, RayTransfer, Rays, Sheets, UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Cubes, Device, DeviceKind, DrawError, Drawn, Frame, Image, PlacedBrick,
+    Planes, RayTransfer, Rays, Sheets, UploadError, VolumeLayout,
 };
 use volery_shaders::raycast;
 
@@ -16,7 +16,7 @@ use crate::pool::Pool;
 use crate::raycast::{Form, Raycast, Resources, bands_buffer, transfer_texture, units_texture};
 use crate::sheets::SheetStacks;
 use crate::surfaces::Surfaces;
-use crate::tiles::Tiles;
+use crate::tiles::{ANY_COLOR, Tiles};
 use crate::units::{Matter, Units};
 use crate::view::shader_frame;
 
@@ -116,7 +116,11 @@ impl WgpuBackend {
         let has_blanks = rays.bricks.iter().any(|brick| resident[&brick.id].summary.has_blanks);
         let gpu = &self.gpu;
         let (units_texture, transfer_texture, bands) = gpu.checked(|| {
-            (units_texture(gpu, &units), transfer_texture(gpu, rays.transfer), bands_buffer(gpu, rays.transfer))
+            (
+                units_texture(gpu, &units),
+                transfer_texture(gpu, rays.transfer),
+                bands_buffer(gpu, rays.transfer),
+            )
         })?;
         self.prepared = Some(Prepared {
             generation: pool.generation(),
@@ -199,7 +203,7 @@ impl WgpuBackend {
         if surfaces.is_empty() {
             return Ok(background(frame));
         }
-        self.tiles.draw(&self.gpu, &mut self.band, (frame, &surfaces), |_| (), |_, ()| ())
+        self.tiles.draw(&self.gpu, &mut self.band, (frame, &surfaces), ANY_COLOR, |_| (), |_, ()| ())
     }
 }
 

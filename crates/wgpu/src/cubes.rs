@@ -18,7 +18,7 @@ use crate::fan_view::shader_frame;
 use crate::gpu::{Failure, Gpu};
 use crate::picture::Band;
 use crate::surfaces::FrameSurfaces;
-use crate::tiles::{Tiles, matter_pipeline};
+use crate::tiles::{ANY_COLOR, Tiles, matter_pipeline};
 
 // What the shader and the rest of the crates must mean alike.
 const _: () = assert!(cubes::NUM_VERTICES as usize == NUM_VERTICES);
@@ -75,7 +75,7 @@ impl CubeFans {
         let pipeline = self.pipeline(gpu, content.thickness, !surfaces.is_empty())?;
         let chunks = gpu.checked(|| self.hold(gpu, content.cubes))?;
         let bind = |tile| self.bind(gpu, &shader_frame(frame, layout, surfaces, tile), surfaces.view());
-        tiles.draw(gpu, band, (frame, surfaces), bind, |pass, fans: &Vec<wgpu::BindGroup>| {
+        tiles.draw(gpu, band, (frame, surfaces), ANY_COLOR, bind, |pass, fans: &Vec<wgpu::BindGroup>| {
             pass.set_pipeline(&pipeline);
             pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
             for (bound, &num_cubes) in fans.iter().zip(&chunks) {

@@ -73,7 +73,11 @@ impl Raycast {
                 pipelines: HashMap::new(),
                 frame: empty("volery frame", size_of::<raycast::Frame>() as u64, wgpu::BufferUsages::UNIFORM),
                 worst: [
-                    empty("volery doubt", WORST_BYTES, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC),
+                    empty(
+                        "volery doubt",
+                        WORST_BYTES,
+                        wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+                    ),
                     empty("volery doubt staging", WORST_BYTES, wgpu::BufferUsages::MAP_READ),
                 ],
                 sampler: device.create_sampler(&wgpu::SamplerDescriptor {
@@ -139,7 +143,8 @@ impl Raycast {
             gpu.wait()
         })??;
         let view = staging.get_mapped_range(..).map_err(|e| Failure::Other(e.to_string()))?;
-        let [cells, table_way] = [0, 4].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
+        let [cells, table_way] =
+            [0, 4].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
         drop(view);
         staging.unmap();
         // Ways are depths to the base 2.

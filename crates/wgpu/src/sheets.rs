@@ -5,6 +5,7 @@
 //! or 12 bytes. A sheet is an indexed draw, whose number tells its thickness; neighbours of equal thickness are one.
 //! The fragment stage knows the angle of its ray with the sheets, so how much matter it passes, looks colour and
 //! extinction up, and blends over what is behind. Blending does not clamp: an opacity below zero takes matter away.
+//! What is summed up is taken into the range of what can be emitted when the tile is copied.
 //!
 //! # Precision
 //! Places reach the eye by rows that f64 made, so a far origin loses nothing. Tables are buffers, interpolated in 32
@@ -32,7 +33,7 @@ use crate::tiles::{Affine, Tile, TileView, Tiles, matter_pipeline};
 use held::{Held, Part, Store, uploaded};
 
 // What the shader and the frame must mean alike.
-const _: () = assert!(sheets::MIN_DEPTH == volery_frame::sheets::MIN_DEPTH);
+const _: () = assert!(sheets::MAX_STRIP_DEPTH == volery_frame::sheets::MAX_STRIP_DEPTH);
 
 /// The pipelines, and what the last frames can lend to the next.
 pub(crate) struct SheetStacks {
@@ -120,7 +121,8 @@ impl SheetStacks {
             let frame = buffer(gpu, "volery sheets frame", &[frame], wgpu::BufferUsages::UNIFORM);
             parts.iter().map(|part| tables.bind(gpu, layout, (&frame, surfaces.view()), part)).collect()
         };
-        let drawn = tiles.draw(gpu, band, (frame, surfaces), bind, |pass, bound: &Vec<wgpu::BindGroup>| {
+        let colors = content.emitted();
+        let encode = |pass: &mut wgpu::RenderPass<'_>, bound: &Vec<wgpu::BindGroup>| {
             pass.set_pipeline(&pipeline);
             let mut last_part = None;
             for Run { part, triangles, sheet } in &runs {
@@ -130,7 +132,8 @@ impl SheetStacks {
                 }
                 pass.draw_indexed(3 * triangles.start..3 * triangles.end, 0, *sheet..*sheet + 1);
             }
-        });
+        };
+        let drawn = tiles.draw(gpu, band, (frame, surfaces), colors, bind, encode);
         self.store.forget_nameless();
         drawn
     }

@@ -15,6 +15,12 @@ use crate::surfaces::{BoundSurfaces, FrameSurfaces};
 /// Most pixels of a tile per axis.
 const TILE: u32 = 2048;
 
+/// The least and the largest number of each channel that may be drawn.
+pub(crate) type Colors = [[f32; 3]; 2];
+
+/// Whatever is drawn.
+pub(crate) const ANY_COLOR: Colors = [[f32::MIN; 3], [f32::MAX; 3]];
+
 /// A part of a picture that is drawn at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Tile {
@@ -143,12 +149,13 @@ impl Tiles {
     }
 
     /// Draws a picture over its surfaces and background, tile by tile: `bind` makes what a tile binds, `encode` adds
-    /// the commands.
+    /// the commands. What comes out beyond `colors` and what is behind becomes the nearest between.
     pub(crate) fn draw<B>(
         &mut self,
         gpu: &Gpu,
         band: &mut Option<Band>,
         (frame, surfaces): (&Frame<'_>, &FrameSurfaces<'_>),
+        colors: Colors,
         mut bind: impl FnMut(Tile) -> B,
         mut encode: impl FnMut(&mut wgpu::RenderPass<'_>, &B),
     ) -> Result<Drawn, Failure> {
@@ -160,7 +167,10 @@ impl Tiles {
                 size: tile.size,
                 surfaces: surfaces.bind(tile),
                 bound: bind(tile),
-                resolve: self.bind_resolve(gpu, tile, rows.start, [&view, surfaces.view()], picture),
+                resolve: {
+                    let in_band = in_band(tile, rows.start, colors, frame.background);
+                    self.bind_resolve(gpu, in_band, [&view, surfaces.view()], picture)
+                },
             });
             tiles.collect::<Vec<_>>()
         };
@@ -223,21 +233,14 @@ impl Tiles {
         self.target.insert(kept.unwrap_or_else(make)).clone()
     }
 
-    /// What copies a tile to the band that begins with row `first_row`.
+    /// What copies a tile to its band.
     fn bind_resolve(
         &self,
         gpu: &Gpu,
-        tile: Tile,
-        first_row: u32,
+        in_band: resolve::Tile,
         [rendered, surfaces]: [&wgpu::TextureView; 2],
         picture: &wgpu::Buffer,
     ) -> wgpu::BindGroup {
-        let in_band = resolve::Tile {
-            origin: [tile.first[0], tile.first[1] - first_row],
-            size: tile.size,
-            band_width: tile.picture_width,
-            ..bytemuck::Zeroable::zeroed()
-        };
         let in_band = buffer(gpu, "volery tile in its band", &[in_band], wgpu::BufferUsages::UNIFORM);
         // A binding that the shader gains and this does not know fails as one of the wrong kind.
         bind_group(gpu, &self.resolve_layout, resolve::BINDINGS, |name| match name {
@@ -246,6 +249,19 @@ impl Tiles {
             "surfaces" => wgpu::BindingResource::TextureView(surfaces),
             _ => picture.as_entire_binding(),
         })
+    }
+}
+
+/// A tile in the band that begins with row `first_row`.
+fn in_band(tile: Tile, first_row: u32, [low, high]: Colors, background: [f32; 3]) -> resolve::Tile {
+    resolve::Tile {
+        origin: [tile.first[0], tile.first[1] - first_row],
+        size: tile.size,
+        band_width: tile.picture_width,
+        low,
+        high,
+        background,
+        ..bytemuck::Zeroable::zeroed()
     }
 }
 

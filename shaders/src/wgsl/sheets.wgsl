@@ -54,7 +54,7 @@ override HAS_SURFACES: bool = false;
 // Rays at a sine below this to a sheet go through as much matter as at this.
 const MIN_COSINE: f32 = 1e-30;
 // As the frame has it.
-const MIN_DEPTH: f32 = -0.5;
+const MAX_STRIP_DEPTH: f32 = 5.0;
 // Nothing is seen through a greater depth.
 const OPAQUE_DEPTH: f32 = 100.0;
 // Up to this depth, opacity is summed from its series.
@@ -193,7 +193,8 @@ fn matter(in: Vertex) -> @location(0) vec4f {
         let way = (end - in.matter.z) * length_per_depth;
         depth *= share_before(way, abs(in.matter.y) / max(cosine, MIN_COSINE), in.matter.w == 0.0);
     }
-    let opacity = opacity_of(clamp(depth, MIN_DEPTH, OPAQUE_DEPTH));
+    let most = select(OPAQUE_DEPTH, MAX_STRIP_DEPTH, in.matter.w != 0.0);
+    let opacity = opacity_of(clamp(depth, -MAX_STRIP_DEPTH, most));
     if IS_PARALLEL && in.matter.z < frame.eye_depth {
         return vec4f(0.0);
     }

@@ -32,7 +32,7 @@ mod meshes;
 mod opacity;
 mod peers;
 mod planes;
-// mod rays; // on once the executors are right on every data
+mod rays;
 mod sections;
 mod stack_files;
 mod trees;

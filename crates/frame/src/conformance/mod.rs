@@ -175,6 +175,7 @@ properties! { $
         thousands_of_thin_sheets
         strips_add_and_take_away
         negative_thickness_is_bounded
+        colours_stay_within_what_is_emitted
         sheets_of_all_extinctions
         eyes_inside_stacks
         far_eyes_and_far_origins

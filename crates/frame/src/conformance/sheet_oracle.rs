@@ -192,11 +192,27 @@ impl Scene {
                 let [r, g, b, extinction] = self.table.classify(value, gradient[3]);
                 let shade = self.shade(DVec3::new(gradient[0], gradient[1], gradient[2]));
                 let thickness = f64::from(sheet.thickness[0]) + f64::from(sheet.thickness[1]) * along;
-                let depth = (extinction * thickness / cosine).max(f64::from(crate::sheets::MIN_DEPTH));
+                let limit = f64::from(crate::sheets::MAX_STRIP_DEPTH);
+                let most = if sheet.thickness[1] == 0.0 { f64::INFINITY } else { limit };
+                let depth = (extinction * thickness / cosine).max(-limit).min(most);
                 light = over([r, g, b].map(|x| x * shade), depth, light);
             }
         }
-        light
+        std::array::from_fn(|i| {
+            light[i].clamp(
+                self.emitted(i, f64::min).min(background[i]),
+                self.emitted(i, f64::max).max(background[i]),
+            )
+        })
+    }
+
+    /// The least or the largest number that a channel of the matter's colours has.
+    pub(super) fn emitted(&self, channel: usize, of: fn(f64, f64) -> f64) -> f64 {
+        let shades = self.light.map_or([1.0; 2], |Light { ambient, diffuse, .. }| {
+            [f64::from(ambient), 1.0_f64.max(f64::from(ambient + diffuse))]
+        });
+        let colors = self.table.entries.iter().map(|entry| f64::from(entry[channel]));
+        colors.flat_map(|color| shades.map(|shade| color * shade)).reduce(of).expect("a table has entries")
     }
 
     fn shade(&self, direction: DVec3) -> f64 {

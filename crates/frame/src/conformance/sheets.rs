@@ -239,9 +239,12 @@ pub fn strips_add_and_take_away(backend: &mut dyn Backend) {
     cameras().iter().for_each(|(what, camera)| scene.check(what, backend, camera, MAX));
     scene.table = Table::ramp(12.0);
     cameras().iter().for_each(|(what, camera)| scene.check(what, backend, camera, 3.0 * MAX));
+    // What strips add or take away is bounded.
+    scene.table = Table::ramp(120.0);
+    cameras().iter().for_each(|(what, camera)| scene.check(what, backend, camera, 3.0 * MAX));
 }
 
-/// Of nothing no more is taken away than [`crate::sheets::MIN_DEPTH`], and light that all but ended may rise again.
+/// Of nothing no more is taken away than [`crate::sheets::MAX_STRIP_DEPTH`], and light that all but ended may rise again.
 pub fn negative_thickness_is_bounded(backend: &mut dyn Backend) {
     let camera = perspective(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 30.0);
     let mut scene = Scene::new(DVec3::Z, Table::ramp(1.0));
@@ -249,8 +252,13 @@ pub fn negative_thickness_is_bounded(backend: &mut dyn Backend) {
     let mut layer = |position: f64, thickness: f32, value: f64| {
         scene.add_square(DVec3::Z * position, 50.0, 2, thickness, &mut random, |_| value);
     };
-    layer(-1.0, 0.8, 1.0);
-    (0..16).for_each(|i| layer(0.01 * f64::from(i), if i % 2 == 0 { -7.0 } else { -0.3 }, 1.0));
+    layer(-1.0, 6.0, 1.0);
+    let thickness = |i: i32| match i % 2 {
+        _ if i == 0 => -7.0,
+        0 => -0.7,
+        _ => -0.3,
+    };
+    (0..16).for_each(|i| layer(0.01 * f64::from(i), thickness(i), 1.0));
     layer(0.9, 9.0, 1.0);
     let sheets = scene.back_to_front(&camera);
     let expected = each_pixel(&camera, SIZE, |ray| scene.seen(ray, &sheets, BACKGROUND_F64));
@@ -262,6 +270,42 @@ pub fn negative_thickness_is_bounded(backend: &mut dyn Backend) {
     let expected = each_pixel(&camera, SIZE, |ray| scene.seen(ray, &sheets, BACKGROUND_F64));
     let image = scene.draw(backend, &camera, SIZE);
     assert_close("matter taken away", &image, &expected, 1e-4, 5e-5);
+}
+
+/// However signed sheets of different colours follow one another, no colour is beyond those of matter and background.
+pub fn colours_stay_within_what_is_emitted(backend: &mut dyn Backend) {
+    let camera = perspective(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 30.0);
+    let entries = vec![[0.9, 0.2, 0.3, 0.5], [0.3, 0.25, 0.8, 6.0], [0.4, 0.6, 0.2, 2.0]];
+    let mut num_beyond = 0;
+    for seed in 0..12 {
+        let mut random = Random(seed);
+        let mut scene = Scene::new(DVec3::Z, Table::of_values(entries.clone(), [0.0, 1.0]));
+        if seed % 3 == 2 {
+            scene.light = Some(Light { toward: [0.6, 0.0, 0.8], ambient: 0.4, diffuse: 0.7 });
+        }
+        for i in 0..7 {
+            let [thickness, tilt] = [0.4 * (random.next() - 0.5), random.next() - 0.5];
+            let value = |place: DVec3| 0.5 + tilt * place.x;
+            scene.add_square(DVec3::Z * (0.1 * f64::from(i)), 50.0, 3, thickness as f32, &mut random, value);
+        }
+        scene.gradients = scene.points.iter().map(|_| [0.6, 0.0, 0.8, 1.0]).collect();
+        let image = scene.draw(backend, &camera, SIZE);
+        let ranges = [0, 1, 2].map(|i| {
+            let [low, high] = [scene.emitted(i, f64::min), scene.emitted(i, f64::max)];
+            [low.min(BACKGROUND_F64[i]) - 1e-6, high.max(BACKGROUND_F64[i]) + 1e-6]
+        });
+        for (index, pixel) in image.pixels.iter().enumerate() {
+            let is_within = |i: usize| (ranges[i][0]..=ranges[i][1]).contains(&f64::from(pixel[i]));
+            assert!((0..3).all(is_within), "seed {seed}, pixel {index}: {pixel:?}, expected in {ranges:?}");
+            let is_at_end = |i: usize| ranges[i].iter().any(|end| (f64::from(pixel[i]) - end).abs() < 3e-6);
+            num_beyond += usize::from((0..3).any(is_at_end));
+        }
+        let sheets = scene.back_to_front(&camera);
+        let expected = each_pixel(&camera, SIZE, |ray| scene.seen(ray, &sheets, BACKGROUND_F64));
+        assert_close(&format!("signed, seed {seed}"), &image, &expected, 3.0 * MAX, MAX);
+    }
+    println!("{num_beyond} pixels at the end of their range (at least 1000)");
+    assert!(num_beyond >= 1000, "{num_beyond}: the sheets hardly take colours beyond their range");
 }
 
 /// Extinction and thickness of all sizes, and sheets seen from their side.

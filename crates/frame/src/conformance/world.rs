@@ -4,7 +4,7 @@ use glam::{DVec3, UVec3};
 use volery_scene::{Camera, ControlPoint, Projection, TransferFunction};
 
 use crate::{
-    Backend, Brick, BrickId, Content, Frame, Image, RayTransfer, PlacedBrick, Rays, TexelType, Texels,
+    Backend, Brick, BrickId, Content, Frame, Image, PlacedBrick, RayTransfer, Rays, TexelType, Texels,
     VolumeLayout,
 };
 

@@ -155,8 +155,11 @@ impl RayTransfer {
         let texel_origin = if is_whole { middle.floor() } else { f64::from(middle as f32) };
         let width = if high > low { high - low } else { 1.0 };
         // Where texels are whole numbers bins end on them: control points mostly stand there.
-        let num_bins =
-            if is_whole && width <= MAX_BINS as f64 { MAX_BINS / width as usize * width as usize } else { MAX_BINS };
+        let num_bins = if is_whole && width <= MAX_BINS as f64 {
+            MAX_BINS / width as usize * width as usize
+        } else {
+            MAX_BINS
+        };
         let bin_width = width / num_bins as f64;
 
         let longest_chord = layout.spacing.length() / unit_length;

@@ -2,7 +2,8 @@
 //!
 //! A map is a list of colours with a space to interpolate in, and maybe a list of opacities. A
 //! [`TransferFunction`] is linear in RGB, so the map is resampled: each interval is halved until the straight
-//! line is within [`MAX_COLOR_ERROR`] of the true colour in every channel, and of the true opacity.
+//! line is within [`MAX_COLOR_ERROR`] of the true colour in every channel, and within [`MAX_OPACITY_ERROR`] of the
+//! true opacity. Opacities between two points follow the curve that VTK 9.7 has for midpoint and sharpness.
 
 use volery_scene::{ControlPoint, TransferFunction, transfer};
 
@@ -11,8 +12,8 @@ use super::color::ColorSpace;
 /// The largest difference of a resampled channel from the map's own interpolation.
 pub const MAX_COLOR_ERROR: f64 = 1.0 / 512.0;
 
-/// What halving aims at: checked at points, so with a reserve of two.
-const AIM: f64 = MAX_COLOR_ERROR / 2.0;
+/// The largest difference of a resampled opacity from the map's own interpolation.
+pub const MAX_OPACITY_ERROR: f64 = 1e-3;
 
 /// Halvings of an eighth of an interval; what is left then is below a step of 16-bit values.
 const MAX_HALVINGS: u32 = 13;
@@ -24,9 +25,10 @@ pub struct OpacityPoint {
     pub value: f64,
     /// In [0, 1].
     pub opacity: f64,
-    /// Where in the interval up to the next point half of the change is reached, in (0, 1).
+    /// Where in the interval up to the next point half of the change is reached, in [0, 1]; no nearer to an end
+    /// than 1e-5 counts.
     pub midpoint: f64,
-    /// 0: linear; 1: a step at the midpoint; between: ever steeper.
+    /// Below 0.01: linear up to the midpoint and from there on; up to 1: ever steeper at the midpoint, never a step.
     pub sharpness: f64,
 }
 
@@ -93,7 +95,8 @@ impl ColorMap {
                 line.push((place(low), to));
             } else if low < high && self.space != ColorSpace::Rgb {
                 let at = |s: f64| self.space.interpolate(from, to, s);
-                refine([low, high], &at, &place, &mut line);
+                let inner = refined(MAX_COLOR_ERROR, [0.0, 1.0], at).into_iter();
+                line.extend(inner.map(|(s, color)| (place(low + (high - low) * s), color)));
             }
         }
         line.extend(self.colors.last().map(|&(value, color)| (place(value), color)));
@@ -104,15 +107,21 @@ impl ColorMap {
         let mut line = Line::new();
         for pair in self.opacities.windows(2) {
             let [from, to] = [pair[0], pair[1]];
-            let value_at = |s: f64| from.value + (to.value - from.value) * s;
+            let value_at = |part: f64| from.value + (to.value - from.value) * from.place_of(part);
             line.push((place(from.value), [from.opacity]));
-            if from.sharpness > 0.99 {
-                let middle = place(value_at(from.midpoint));
-                line.extend([(middle, [from.opacity]), (middle, [to.opacity])]);
-            } else if from.sharpness >= 0.01 {
-                refine([from.value, to.value], &|s| [shaped(from, to.opacity, s)], &place, &mut line);
-            } else if from.midpoint != 0.5 {
-                line.push((place(value_at(from.midpoint)), [(from.opacity + to.opacity) / 2.0]));
+            if from.value == to.value || from.is_linear() && from.midpoint == 0.5 {
+                continue;
+            }
+            // What has a kink at the midpoint is smooth on either side.
+            for half in [[0.0, 0.5], [0.5, 1.0]] {
+                if half[0] > 0.0 {
+                    line.push((place(value_at(0.5)), [from.halfway(to.opacity)]));
+                }
+                if !from.is_linear() {
+                    let curve = |part: f64| [from.shaped(to.opacity, part)];
+                    let inner = refined(MAX_OPACITY_ERROR, half, curve);
+                    line.extend(inner.into_iter().map(|(part, opacity)| (place(value_at(part)), opacity)));
+                }
             }
         }
         line.extend(self.opacities.last().map(|point| (place(point.value), [point.opacity])));
@@ -142,42 +151,69 @@ fn stretch([from_low, from_high]: [f64; 2], [low, high]: [f64; 2]) -> impl Fn(f6
     }
 }
 
-/// The opacity at `s` of the way to the next point, by the Hermite curve with sharpness of VTK's piecewise
-/// function.
-fn shaped(from: OpacityPoint, to: f64, s: f64) -> f64 {
-    let OpacityPoint { opacity, midpoint, sharpness, value: _ } = from;
-    let s = if s < midpoint { 0.5 * s / midpoint } else { 0.5 + 0.5 * (s - midpoint) / (1.0 - midpoint) };
-    let power = 1.0 + 10.0 * sharpness;
-    let s = if s < 0.5 { 0.5 * (2.0 * s).powf(power) } else { 1.0 - 0.5 * (2.0 - 2.0 * s).powf(power) };
-    let (s2, s3) = (s * s, s * s * s);
-    let slope = (1.0 - sharpness) * (to - opacity);
-    let ends = (2.0 * s3 - 3.0 * s2 + 1.0) * opacity + (3.0 * s2 - 2.0 * s3) * to;
-    let tangents = (s3 - 2.0 * s2 + s + s3 - s2) * slope;
-    (ends + tangents).clamp(opacity.min(to), opacity.max(to))
+/// The curve from a point to the next, as VTK's piecewise function has it. The way there is told in parts of which half
+/// is before the midpoint.
+impl OpacityPoint {
+    /// As VTK keeps it off the ends.
+    fn midpoint(&self) -> f64 {
+        self.midpoint.clamp(1e-5, 1.0 - 1e-5)
+    }
+
+    fn is_linear(&self) -> bool {
+        self.sharpness < 0.01
+    }
+
+    /// How far along the interval a part of the way is.
+    fn place_of(&self, part: f64) -> f64 {
+        let midpoint = self.midpoint();
+        if part < 0.5 { 2.0 * part * midpoint } else { midpoint + (2.0 * part - 1.0) * (1.0 - midpoint) }
+    }
+
+    /// The opacity at the midpoint.
+    fn halfway(&self, to: f64) -> f64 {
+        0.5 * (self.opacity + to)
+    }
+
+    /// The opacity at a part of the way to the opacity `to`, where it is not linear: a Hermite curve of a place that
+    /// sharpness draws to the ends.
+    fn shaped(&self, to: f64, part: f64) -> f64 {
+        let OpacityPoint { opacity, sharpness, .. } = *self;
+        let power = 1.0 + 10.0 * sharpness;
+        let s = if part < 0.5 {
+            0.5 * (2.0 * part).powf(power)
+        } else {
+            1.0 - 0.5 * (2.0 - 2.0 * part).powf(power)
+        };
+        let (s2, s3) = (s * s, s * s * s);
+        let slope = (1.0 - sharpness) * (to - opacity);
+        let ends = (2.0 * s3 - 3.0 * s2 + 1.0) * opacity + (3.0 * s2 - 2.0 * s3) * to;
+        let tangents = (s3 - 2.0 * s2 + s + s3 - s2) * slope;
+        (ends + tangents).clamp(opacity.min(to), opacity.max(to))
+    }
 }
 
-/// Appends the inner points of a curve over an interval, so many that straight lines are near enough.
-fn refine<const N: usize>(
-    [low, high]: [f64; 2],
-    curve: &impl Fn(f64) -> [f64; N],
-    place: &impl Fn(f64) -> f64,
-    line: &mut Line<N>,
-) {
+/// The inner points of a curve over an interval, so many that straight lines are within `max_error`.
+fn refined<const N: usize>(
+    max_error: f64,
+    [first, last]: [f64; 2],
+    curve: impl Fn(f64) -> [f64; N],
+) -> Line<N> {
     const PARTS: u32 = 8;
+    let mut line = Line::new();
     for part in 0..PARTS {
-        let [s0, s1] = [part, part + 1].map(|n| f64::from(n) / f64::from(PARTS));
+        let [s0, s1] = [part, part + 1].map(|n| first + (last - first) * f64::from(n) / f64::from(PARTS));
         if part > 0 {
-            line.push((place(low + (high - low) * s0), curve(s0)));
+            line.push((s0, curve(s0)));
         }
-        halve([s0, s1], MAX_HALVINGS, curve, &mut |s| {
-            line.push((place(low + (high - low) * s), curve(s)));
-        });
+        // Checked at points, so with a reserve of two.
+        halve([s0, s1], (max_error / 2.0, MAX_HALVINGS), &curve, &mut |s| line.push((s, curve(s))));
     }
+    line
 }
 
 fn halve<const N: usize>(
     [s0, s1]: [f64; 2],
-    halvings: u32,
+    (aim, halvings): (f64, u32),
     curve: &impl Fn(f64) -> [f64; N],
     add: &mut impl FnMut(f64),
 ) {
@@ -186,15 +222,15 @@ fn halve<const N: usize>(
     let is_straight = (1..CHECKS).all(|check| {
         let w = f64::from(check) / f64::from(CHECKS);
         let truth = curve(s0 + (s1 - s0) * w);
-        (0..N).all(|i| (start[i] + (end[i] - start[i]) * w - truth[i]).abs() <= AIM)
+        (0..N).all(|i| (start[i] + (end[i] - start[i]) * w - truth[i]).abs() <= aim)
     });
     if is_straight || halvings == 0 {
         return;
     }
     let middle = (s0 + s1) / 2.0;
-    halve([s0, middle], halvings - 1, curve, add);
+    halve([s0, middle], (aim, halvings - 1), curve, add);
     add(middle);
-    halve([middle, s1], halvings - 1, curve, add);
+    halve([middle, s1], (aim, halvings - 1), curve, add);
 }
 
 /// Both lines as one list of control points, exactly: a point wherever one of them has one.
@@ -290,13 +326,127 @@ mod tests {
         }
     }
 
+    /// `[from, to, midpoint, sharpness]` of an interval, and what `vtkPiecewiseFunction` of VTK 9.7.2 returns at
+    /// [`PLACES`] of it.
+    const VTK: [([f64; 4], [f64; 7]); 16] = [
+        ([0.0, 1.0, 0.5, 1.0], [0.0000000, 0.0000000, 0.0009837, 0.5000000, 0.9982387, 1.0000000, 1.0000000]),
+        ([0.2, 0.9, 0.3, 0.5], [0.2000002, 0.2173275, 0.7459934, 0.8723330, 0.8953508, 0.8999047, 0.9000000]),
+        (
+            [0.9, 0.1, 0.7, 0.995],
+            [0.9000000, 0.9000000, 0.8999976, 0.8995764, 0.8613131, 0.1001064, 0.1000000],
+        ),
+        ([0.0, 1.0, 0.5, 0.9], [0.0000000, 0.0000053, 0.0040717, 0.5000000, 0.9940555, 0.9999947, 1.0000000]),
+        ([0.1, 0.6, 0.0, 0.4], [0.3922261, 0.5364973, 0.5836840, 0.5951673, 0.5988020, 0.5999520, 0.6000000]),
+        ([0.1, 0.6, 1.0, 0.4], [0.1000000, 0.1000480, 0.1010474, 0.1048327, 0.1149633, 0.1635027, 0.2949385]),
+        (
+            [1.0, 0.0, 0.25, 0.01],
+            [0.9518804, 0.6093452, 0.4123176, 0.3193051, 0.2357302, 0.1160343, 0.0197043],
+        ),
+        (
+            [0.3, 0.8, 0.6, 0.0099],
+            [0.3125000, 0.3833333, 0.4541667, 0.5083333, 0.5625000, 0.6750000, 0.7750000],
+        ),
+        (
+            [0.324, 0.151, 0.651, 0.072],
+            [0.3235963, 0.3133026, 0.2924564, 0.2700454, 0.2447118, 0.1830090, 0.1529393],
+        ),
+        (
+            [0.536, 0.366, 0.058, 0.507],
+            [0.5352122, 0.3893365, 0.3701207, 0.3669258, 0.3661705, 0.3660034, 0.3660000],
+        ),
+        (
+            [0.037, 0.434, 0.07, 0.091],
+            [0.0737618, 0.2872282, 0.3430938, 0.3765754, 0.4005143, 0.4243422, 0.4335568],
+        ),
+        (
+            [0.425, 0.827, 0.124, 0.223],
+            [0.4266028, 0.6823967, 0.7660733, 0.7997745, 0.8161814, 0.8256719, 0.8269927],
+        ),
+        (
+            [0.627, 0.948, 0.577, 0.397],
+            [0.6270000, 0.6275024, 0.6387461, 0.6937442, 0.8647061, 0.9456058, 0.9479992],
+        ),
+        (
+            [0.976, 0.047, 0.858, 0.29],
+            [0.9759993, 0.9748713, 0.9633117, 0.9329830, 0.8685847, 0.6376332, 0.0493673],
+        ),
+        (
+            [0.144, 0.118, 0.308, 0.816],
+            [0.1440000, 0.1439484, 0.1214606, 0.1181625, 0.1180101, 0.1180000, 0.1180000],
+        ),
+        (
+            [0.181, 0.582, 0.639, 0.372],
+            [0.1810001, 0.1815255, 0.1911778, 0.2304460, 0.3500110, 0.5738309, 0.5819961],
+        ),
+    ];
+
+    const PLACES: [f64; 7] = [0.03, 0.2, 0.37, 0.5, 0.62, 0.8, 0.96];
+
+    /// A map of one interval of values from -2 to 6, and its first point.
+    fn interval([from, to, midpoint, sharpness]: [f64; 4]) -> (ColorMap, OpacityPoint) {
+        let first = OpacityPoint { value: -2.0, opacity: from, midpoint, sharpness };
+        let last = OpacityPoint { value: 6.0, opacity: to, midpoint: 0.5, sharpness: 0.0 };
+        let map = map(ColorSpace::Rgb, &[(-2.0, [0.0; 3]), (6.0, [1.0; 3])]);
+        (ColorMap { opacities: vec![first, last], ..map }, first)
+    }
+
+    /// The curve at a place of the interval, none of it resampled.
+    fn curve(point: OpacityPoint, to: f64, place: f64) -> f64 {
+        let midpoint = point.midpoint();
+        let part = if place < midpoint {
+            0.5 * place / midpoint
+        } else {
+            0.5 + 0.5 * (place - midpoint) / (1.0 - midpoint)
+        };
+        assert!((point.place_of(part) - place).abs() < 1e-12, "{point:?}: {place}");
+        if point.is_linear() { point.opacity + (to - point.opacity) * part } else { point.shaped(to, part) }
+    }
+
+    #[test]
+    fn opacities_are_those_of_vtk() {
+        let (mut worst, mut resampled) = (0.0_f64, 0.0_f64);
+        for (case, expected) in VTK {
+            let (map, first) = interval(case);
+            let transfer = map.transfer_function(None, 1.0).unwrap();
+            for (place, expected) in PLACES.into_iter().zip(expected) {
+                worst = worst.max((curve(first, case[1], place) - expected).abs());
+                resampled = resampled.max((transfer.classify(-2.0 + 8.0 * place).1 - expected).abs());
+            }
+        }
+        println!("off VTK by {worst:.1e} (threshold 1e-6), resampled by {resampled:.1e} (1e-3)");
+        assert!(worst <= 1e-6 && resampled <= MAX_OPACITY_ERROR, "{worst} {resampled}");
+    }
+
+    #[test]
+    fn resampled_opacities_keep_their_bound_with_few_points() {
+        let steps = [0.0, 1e-7, 0.004, 0.01, 0.1, 0.37, 0.5, 0.8, 0.99, 0.992, 1.0];
+        let (mut worst, mut most_points) = (0.0_f64, 0);
+        for (midpoint, sharpness) in steps.iter().flat_map(|&m| steps.map(|s| (m, s))) {
+            let (map, first) = interval([0.0, 1.0, midpoint, sharpness]);
+            let transfer = map.transfer_function(None, 1.0).unwrap();
+            most_points = most_points.max(transfer.points().len());
+            // Evenly over the interval, and evenly on either side of the midpoint.
+            let even = (0..=5000).map(|i| f64::from(i) / 5000.0);
+            for place in even.clone().chain(even.map(|part| first.place_of(part))) {
+                let found = transfer.classify(-2.0 + 8.0 * place).1;
+                let expected = curve(first, 1.0, place);
+                worst = worst.max((found - expected).abs());
+            }
+        }
+        println!(
+            "resampled: worst {worst:.2e} of {MAX_OPACITY_ERROR:.0e}, at most {most_points} points of 150"
+        );
+        assert!(worst <= MAX_OPACITY_ERROR, "{worst}");
+        assert!(most_points <= 150, "{most_points} points");
+    }
+
     #[test]
     fn opacities_keep_midpoint_and_sharpness() {
         let point =
             |value, opacity, midpoint, sharpness| OpacityPoint { value, opacity, midpoint, sharpness };
         let opacities = vec![
             point(0.0, 0.0, 0.25, 0.0),
-            point(1.0, 1.0, 0.5, 1.0),
+            point(1.0, 1.0, 0.8, 0.0),
             point(2.0, 0.2, 0.3, 0.5),
             point(3.0, 0.8, 0.5, 0.0),
         ];
@@ -306,14 +456,10 @@ mod tests {
         };
         let tf = map.transfer_function(None, 1.0).unwrap();
         for (value, opacity) in
-            [(0.25, 0.5), (0.5, 2.0 / 3.0), (1.25, 1.0), (1.5, 0.2), (1.75, 0.2), (4.0, 0.8)]
+            [(0.25, 0.5), (0.5, 2.0 / 3.0), (1.4, 0.8), (1.8, 0.6), (1.9, 0.4), (2.0, 0.2), (4.0, 0.8)]
         {
             assert!((tf.classify(value).1 - opacity).abs() < 1e-12, "at {value}: {:?}", tf.classify(value));
         }
-        let worst = (0..=1000).map(|i| f64::from(i) / 1000.0);
-        let worst =
-            worst.map(|s| (tf.classify(2.0 + s).1 - shaped(opacities[2], 0.8, s)).abs()).fold(0.0, f64::max);
-        assert!(worst <= MAX_COLOR_ERROR, "{worst}");
-        assert_eq!(shaped(opacities[2], 0.8, 0.3), 0.5, "half the change at the midpoint");
+        assert!((tf.classify(2.3).1 - 0.5).abs() < 1e-12, "half the change at the midpoint");
     }
 }

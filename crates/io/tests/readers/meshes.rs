@@ -140,8 +140,8 @@ fn obj_lines_are_joined_only_where_a_statement_goes_on() {
         ("v 1 0 0\n", "v 1 \\\n0 \\\r\n 0\n"),
         ("f 1 2 3 4\n", "f 1 2 \\\n3 4\n"),
         // What follows none of these is part of them.
-        ("v 1 0 0\n", "# a path C:\\\nv 1 0 0\n"),
-        ("v 1 0 0\n", "usemtl C:\\\nv 1 0 0\n"),
+        ("v 1 0 0\n", "# a path a:\\\nv 1 0 0\n"),
+        ("v 1 0 0\n", "usemtl a:\\\nv 1 0 0\n"),
         ("v 1 0 0\n", "g a\\\nv 1 0 0\n"),
         ("f 1 2 3 4\n", "mtllib x\\\nf 1 2 3 4\n"),
         ("v 0 0 0\n", "#\\\nv 0 0 0\n"),

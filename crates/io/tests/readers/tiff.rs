@@ -45,7 +45,7 @@ fn slices_channels_and_times_are_told_apart() {
                 let volume = read_volume(&path, &options).unwrap_or_else(|error| panic!("{error}"));
                 assert_eq!(volume.grid.dims(), [2, 1, 2], "{description}");
                 let page = |slice| 10 * (slice * slice_step + channel * channel_step + time * time_step);
-                let expected = [0, 1].map(|slice| page(slice)).map(|first| [first, first + 1]);
+                let expected = [0, 1].map(page).map(|first| [first, first + 1]);
                 let expected: Vec<f64> = expected.concat().into_iter().map(|value| value as f64).collect();
                 assert_values(&volume, &expected);
             }

@@ -119,6 +119,33 @@ fn a_grid_without_cells_has_no_extent_and_no_sections() {
     assert_eq!(slice(&nothing, &planes).num_polygons(), 0);
 }
 
+#[test]
+fn grids_too_flat_too_fine_or_too_far_are_refused_with_their_numbers() {
+    let box_of = |low: DVec3, size: DVec3| Parts {
+        points: unit_cell(Hexahedron).into_iter().map(|point| low + size * point).collect(),
+        cells: vec![(Hexahedron, (0..8).collect())],
+    };
+    let planes =
+        |parts: &Parts, count| Planes::over(&parts.grid(), DVec3::Z, count).map_err(|e| e.to_string());
+    let flat = planes(&box_of(DVec3::splat(3.0), DVec3::new(1.0, 1.0, 0.0)), 3).unwrap_err();
+    assert!(flat.contains("flat along") && flat.contains("at 3,"), "{flat}");
+    // An extent of eight steps of what 64 bits hold there.
+    let fine = box_of(DVec3::splat(1e9), DVec3::splat(8.0 * 2.0_f64.powi(-23)));
+    assert_eq!(planes(&fine, 2).map(|planes| planes.len()), Ok(2));
+    let error = planes(&fine, 300).unwrap_err();
+    assert!(error.contains("300 planes from 1000000000 to"), "{error}");
+    for (size, is_drawn) in [(1e30, true), (1e31, false), (1e300, false)] {
+        let slicer = Slicer::new(box_of(DVec3::ZERO, DVec3::new(size, 1.0, 1.0)).grid()).unwrap();
+        let planes = Planes::over(slicer.grid(), DVec3::Z, 3).unwrap();
+        let mesh = slicer.mesh(&planes, &vec![0.0_f32; 8].into(), None);
+        let is_finite = mesh.as_ref().map(|mesh| mesh.points.as_flattened().iter().all(|x| x.is_finite()));
+        match is_finite {
+            Ok(is_finite) => assert!(is_drawn && is_finite, "{size:e}"),
+            Err(error) => assert!(!is_drawn && error.to_string().contains("from its middle"), "{error}"),
+        }
+    }
+}
+
 pub(crate) fn any_parts() -> impl Strategy<Value = Parts> {
     // Few places and few nodes, so that nodes coincide, repeat, and lie on planes.
     let coordinate = prop_oneof![4 => (0..4i32).prop_map(f64::from), 1 => -1e3..1e3f64, 1 => any::<f64>()];

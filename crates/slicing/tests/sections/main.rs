@@ -5,6 +5,7 @@
 mod adaptive;
 mod cells;
 mod code;
+mod collapsed;
 mod compact;
 mod gradients;
 mod grids;

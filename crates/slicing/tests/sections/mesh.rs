@@ -22,9 +22,9 @@ fn mesh(slicer: &Slicer, planes: &Planes) -> SliceMesh {
 
 /// A line in space: a place on it and its unit direction.
 #[derive(Clone, Copy, Debug)]
-struct Line {
-    place: DVec3,
-    direction: DVec3,
+pub(crate) struct Line {
+    pub(crate) place: DVec3,
+    pub(crate) direction: DVec3,
 }
 
 impl Line {
@@ -40,7 +40,7 @@ impl Line {
 }
 
 /// Length of a line in all cells: where it leaves the triangles of their surfaces, less where it comes in.
-fn chord(grid: &UnstructuredGrid, line: Line) -> f64 {
+pub(crate) fn chord(grid: &UnstructuredGrid, line: Line) -> f64 {
     let mut sum = 0.0;
     for cell in (0..grid.cells().len()).filter(|&cell| !grid.is_blank(cell)) {
         let (cell_type, nodes) = grid.cells().get(cell);
@@ -87,7 +87,7 @@ fn triangles<'a>(mesh: &'a SliceMesh, sheet: &MeshSheet) -> &'a [[u32; 3]] {
 }
 
 /// Matter that the sheets stand for along a line.
-fn drawn(mesh: &SliceMesh, line: Line) -> f64 {
+pub(crate) fn drawn(mesh: &SliceMesh, line: Line) -> f64 {
     let line = Line { place: line.place - mesh.origin, ..line };
     let mut sum = 0.0;
     for sheet in &mesh.sheets {
@@ -395,4 +395,26 @@ fn sheets_come_from_back_to_front() {
         "rays up: the highest is the farthest"
     );
     assert_eq!(first(f64::INFINITY), positions[0]);
+}
+
+#[test]
+fn a_strip_that_reaches_from_below_the_eye_to_above_counts_as_its_middle_does() {
+    let corners = [[2.0, 0.0, -1.0, 0.0], [2.0, 1.0, 2.0, 0.0], [2.0, -1.0, 2.0, 0.0]];
+    // Seen from inside, along x: where the middle is above the eye the ray leaves going up, so thickness rises.
+    for (eye_height, rises) in [(0.5, true), (1.5, false)] {
+        for first in 0..3u32 {
+            let mut mesh = SliceMesh {
+                normal: DVec3::Z,
+                points: corners.to_vec(),
+                triangles: vec![[0, 1, 2].map(|at: u32| (at + first) % 3)],
+                sheets: vec![MeshSheet { position: 0.0, thickness: [-0.0, 1.0], triangles: 0..1 }],
+                ..SliceMesh::default()
+            };
+            let [a, b, c] = self::corners(&mesh, mesh.triangles[0]);
+            assert!((b - a).cross(c - a).x > 0.0, "the outward normal points along the rays");
+            mesh.orient_strips(Rays::From(DVec3::new(-3.0, 0.0, eye_height)));
+            let slope = mesh.sheets[0].thickness[1];
+            assert_eq!(slope > 0.0, rises, "eye at {eye_height}, first {first}: slope {slope}");
+        }
+    }
 }

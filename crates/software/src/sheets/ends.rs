@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::raster::{Fragments, THICKNESS};
+use super::raster::{Fragments, STRIP, THICKNESS};
 use super::view::View;
 use crate::surfaces::Surfaces;
 use crate::tile::TILE;
@@ -28,7 +28,7 @@ pub(super) fn cut<const N: usize>(
     (fragments, start): (&mut Fragments<N>, usize),
 ) {
     for place in start..fragments.len {
-        let pixel = fragments.pixels[place] as u32;
+        let pixel = (fragments.pixels[place] % STRIP) as u32;
         let [column, row] = [first[0] + pixel % TILE, first[1] + pixel / TILE];
         let end = surfaces.depth(column, row);
         if end == f64::INFINITY {

@@ -23,6 +23,9 @@ const BATCH: usize = 512;
 /// Which of a fragment's numbers is the thickness.
 pub(super) const THICKNESS: usize = 1;
 
+/// What the number of a pixel is greater by where a fragment is of a strip.
+pub(super) const STRIP: i32 = (TILE * TILE) as i32;
+
 /// Room for a batch and what one packet adds.
 pub(super) const ROOM: usize = BATCH + 16;
 
@@ -33,7 +36,7 @@ const MIDDLE: f32 = (TILE / 2) as f32;
 /// and of gradients the magnitude and the direction.
 pub(super) struct Fragments<const N: usize> {
     pub(super) len: usize,
-    /// Pixels in the tile.
+    /// Pixels in the tile; of strips plus [`STRIP`].
     pub(super) pixels: [i32; ROOM],
     pub(super) attributes: [[f32; ROOM]; N],
 }
@@ -117,6 +120,8 @@ pub(super) struct Triangle<const N: usize> {
     near: Option<Side>,
     /// At the first vertex, and what the others have more.
     attributes: [[f32; 3]; N],
+    /// The number of the tile's first pixel.
+    first_pixel: i32,
 }
 
 #[inline(always)]
@@ -131,7 +136,7 @@ impl<const N: usize> Triangle<N> {
         [a, b, c]: [&Vertex; 3],
         attributes: [[f32; N]; 3],
         first: [u32; 2],
-        is_perspective: bool,
+        (is_perspective, is_strip): (bool, bool),
     ) -> Option<Self> {
         let normals = [cross(b.place, c.place), cross(c.place, a.place), cross(a.place, b.place)];
         let facing = a.place[0] * normals[0][0] + a.place[1] * normals[0][1] + a.place[2] * normals[0][2];
@@ -158,7 +163,8 @@ impl<const N: usize> Triangle<N> {
         }
         let sides =
             [Side::new(normals[0], middle), Side::new(normals[1], middle), Side::new(normals[2], middle)];
-        Some(Self { sides, near, attributes: by_attribute })
+        let first_pixel = if is_strip { STRIP } else { 0 };
+        Some(Self { sides, near, attributes: by_attribute, first_pixel })
     }
 
     /// Adds the fragments of a packet that begins at a pixel of the tile, none of them beyond the pixel `last`.
@@ -197,7 +203,8 @@ impl<const N: usize> Triangle<N> {
             let sum = c.mul_add(f32x16::splat(simd, third), sum);
             sum.compress(inside).store_slice(&mut to[at..at + 16]);
         }
-        let pixels = i32x16::from_slice(simd, &packet.pixels) + (first[1] * TILE + first[0]) as i32;
+        let pixels = i32x16::from_slice(simd, &packet.pixels)
+            + (self.first_pixel + (first[1] * TILE + first[0]) as i32);
         pixels.compress(inside).store_slice(&mut fragments.pixels[at..at + 16]);
         fragments.len += count;
     }

@@ -2,10 +2,10 @@
 
 use fearless_simd::{f32x4, f32x16, i32x16, prelude::*};
 use volery_frame::Light;
-use volery_frame::sheets::MIN_DEPTH;
+use volery_frame::sheets::MAX_STRIP_DEPTH;
 
 use super::NUM_PIXELS;
-use super::raster::{Fragments, ROOM};
+use super::raster::{Fragments, ROOM, STRIP};
 use super::table::Table;
 use crate::math::opacity_of_depth;
 
@@ -51,15 +51,19 @@ impl Shading<'_> {
                 entries.shade(simd, &light, [attribute(3), attribute(4), attribute(5)]);
             }
             let mut places = [0; 16];
-            let mut obliquities = [0.0; 16];
+            let (mut obliquities, mut most) = ([0.0; 16], [f32::MAX; 16]);
             for lane in 0..16 {
                 // Of no fragment, a number of another.
                 places[lane] = fragments.pixels[start + lane] as usize % NUM_PIXELS;
                 obliquities[lane] = self.obliquities[places[lane]];
+                if fragments.pixels[start + lane] >= STRIP {
+                    most[lane] = MAX_STRIP_DEPTH;
+                }
             }
             let lengths = f32x16::from_slice(simd, attribute(1)) * f32x16::from_slice(simd, &obliquities);
             let depth = lengths * f32x16::from_slice(simd, &entries.extinctions);
-            let opacity = opacity_of_depth(simd, depth.max(f32x16::splat(simd, MIN_DEPTH)));
+            let depth = depth.min(f32x16::from_slice(simd, &most));
+            let opacity = opacity_of_depth(simd, depth.max(f32x16::splat(simd, -MAX_STRIP_DEPTH)));
             let opacities: [f32; 16] = opacity.into();
             for lane in 0..(fragments.len - start).min(16) {
                 let pixel = &mut pixels[places[lane]];
