@@ -113,28 +113,28 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) stack: StackArgs,
     /// Folder that the paths in a scene file are relative to [default: that of the scene file]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, help_heading = "Output", value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
     /// Who draws: auto is a GPU if there is one, else software
-    #[arg(long, value_enum, default_value_t = BackendName::Auto)]
+    #[arg(long, help_heading = "Output", value_enum, default_value_t = BackendName::Auto)]
     pub(crate) backend: BackendName,
     /// Measure the distance from the exact picture; takes its time
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     pub(crate) verify: bool,
     /// Write the differences from the exact picture, amplified by the power of two that is printed
-    #[arg(long, value_name = "OUT.png",
+    #[arg(long, help_heading = "Output", value_name = "OUT.png",
         value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["png", "exr"])))]
     pub(crate) error_map: Option<PathBuf>,
     /// Write input, times, work and error as JSON
-    #[arg(long, value_name = "OUT.json")]
+    #[arg(long, help_heading = "Output", value_name = "OUT.json")]
     pub(crate) report: Option<PathBuf>,
     /// Write a scene file that draws the same picture, bit for bit
-    #[arg(long, value_name = "OUT.json",
+    #[arg(long, help_heading = "Output", value_name = "OUT.json",
         value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["json"])))]
     pub(crate) save_scene: Option<PathBuf>,
     /// Draw the picture so often, and report the time of each and their median; with a place for a number in OUT, such
     /// as OUT-%03d.png, each is a file of its own
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_000_000))]
+    #[arg(long, help_heading = "Output", value_name = "N", default_value_t = 1, value_parser = whole(1_000_000))]
     pub(crate) frames: u32,
 }
 

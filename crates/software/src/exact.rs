@@ -122,7 +122,8 @@ impl<S: Simd> Row<S> {
         let opacity = self.opacity_slope.mul_add(u, self.opacity).max(zero).min(one);
         let clearness = self.clearness(u).max(zero).min(one);
         // Where rounding alone makes a texel opaque there is a pole nearby, not here.
-        let least = f32x16::splat(simd, f32::EPSILON / 4.0);
+        let is_flat = self.opacity_slope.simd_eq(0.0);
+        let least = is_flat.select(f32x16::splat(simd, 1e-37), f32x16::splat(simd, f32::EPSILON / 4.0));
         clear_log(simd, opacity, clearness.max(least))
     }
 

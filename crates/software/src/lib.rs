@@ -30,8 +30,8 @@
 //! A half cell is integrated as if the field were linear over it: of second order in the size of a cell, and nothing at
 //! all along the axes, where the field is linear. The straight lines are laid so that their means are those of the
 //! field, and what the colours of neighbouring pieces differ by tells how much more of a piece's front is seen than of
-//! its back. What that may be off by is known per cell (see `walk`): where it is above .003 the packet takes quarters,
-//! above .012 or where the table is too coarse the cell is integrated as the cubic that it is, from control point to
+//! its back. What that may be off by is known per cell (see `walk`): where it is above .002 the packet takes quarters,
+//! above .008 or where the table is too coarse the cell is integrated as the cubic that it is, from control point to
 //! control point (`exact`). So hard cells cost three to five times as much as others, and easy ones nothing. Values are
 //! rounded to the table's bins (1/8192 of what can be seen). A ray ends when less than [`MIN_TRANSMITTANCE`] of what
 //! lies behind can come through, and that rest is dropped. Sums are in f32. Each picture says what all that may come to:

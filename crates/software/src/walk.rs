@@ -19,7 +19,7 @@ use crate::packet::Span;
 use crate::texel::Texel;
 
 /// The largest doubt of a cell, as a difference of a colour channel. Four pieces have a quarter of that of two.
-const MAX_DOUBT: f32 = 0.003;
+const MAX_DOUBT: f32 = 0.002;
 
 /// Light gathered so far.
 pub(crate) struct Light<S: Simd> {

@@ -275,7 +275,7 @@ fn what_cannot_be_drawn_is_an_error() {
         assert!(error.contains(expected) && error.len() < 120, "{error}");
     }
 
-    let mut session = session_of(volery_data::cylinder(1));
+    let mut session = session_of(volery_data::cylinder(3));
     let good = session.view(&options(0.0, false));
     let mut fails =
         |stack: StackView| session.render(&View { stack, ..good.clone() }).unwrap_err().to_string();

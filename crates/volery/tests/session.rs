@@ -73,8 +73,8 @@ fn a_picture_does_not_depend_on_what_was_drawn_before() {
 }
 
 #[test]
-fn tolerance_0_draws_the_finest_level_alone() {
-    // A constant half: errors there are 0, and still the nodes are fine.
+fn tolerance_0_draws_the_finest_level_where_the_field_changes() {
+    // A constant half, which is drawn as it is.
     let half = volery_data::half_space([70, 70, 70], DVec3::ONE, DVec3::X, 35.0);
     let mut session = session_of(half);
     let point = |value, opacity| ControlPoint { value, color: [1.0; 3], opacity };
@@ -83,7 +83,8 @@ fn tolerance_0_draws_the_finest_level_alone() {
     let full = session.render(&view).unwrap();
     let zero = session.render(&View { tolerance: Some(0.0), ..view.clone() }).unwrap();
     assert!(full.image == zero.image);
-    assert_eq!(full.report.work.nodes_by_level.as_ref().unwrap().len(), 1);
+    let nodes = full.report.work.nodes_by_level.as_ref().unwrap();
+    assert!(nodes[0] > 0 && nodes.iter().sum::<usize>() < 27, "{nodes:?}");
     assert_eq!(
         zero.report.work.nodes_by_level.as_ref().unwrap(),
         full.report.work.nodes_by_level.as_ref().unwrap()

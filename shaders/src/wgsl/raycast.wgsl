@@ -77,7 +77,7 @@ const OPAQUE_DEPTH: f32 = 12.0;
 const INVISIBLE: f32 = 1e-30;
 // The largest doubt of a stretch of ray, as a difference of a colour channel: beyond, it is halved, and where that
 // cannot be enough integrated exactly.
-const MAX_DOUBT: f32 = 0.003;
+const MAX_DOUBT: f32 = 0.002;
 // What a channel may be off by where a cell was integrated exactly, as a share of the light that it takes.
 const EXACT_DOUBT: f32 = 0.0025;
 // Longer than any ray.

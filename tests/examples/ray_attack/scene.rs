@@ -127,11 +127,7 @@ pub(crate) struct Measured {
     pub(crate) seconds: f64,
 }
 
-/// The largest error that a report's `error` admits: `budget_max`, or the sum of its bounds.
+/// The largest error that a report's `error` admits.
 fn stated(error: &serde_json::Value) -> Option<f64> {
-    let whole = [&error["budget_max"], &error["budget"]].into_iter().find_map(serde_json::Value::as_f64);
-    whole.or_else(|| {
-        let bounds = error.as_object()?.iter().filter(|(name, _)| name.ends_with("_bound"));
-        bounds.filter_map(|(_, bound)| bound.as_f64()).reduce(|a, b| a + b)
-    })
+    error["budget"]["max"].as_f64()
 }

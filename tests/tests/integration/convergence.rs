@@ -58,9 +58,10 @@ fn the_reference_converges_with_the_grid_at_second_order() {
 by_both_backends! { a_backend_converges_to_the_reference_at_second_order }
 
 fn a_backend_converges_to_the_reference_at_second_order(choice: BackendChoice, test: &str) {
-    // On the same samples, what is left is the integration over parts of cells. A backend may cut coarse cells into
-    // more parts than fine ones, so the order counts over the whole range, not from one halving to the next.
-    let view = view();
+    // On the same samples, what is left is the integration over parts of cells. Matter is thin here: where straight
+    // pieces could be off by much, backends cut finer or integrate exactly, and there is no order to be seen.
+    let thin = TransferFunction::new(view().transfer.points().to_vec(), 10.0).unwrap();
+    let view = View { transfer: thin, ..view() };
     let mut errors = Vec::new();
     for cells in [8, 16, 32] {
         let grid = smooth(cells);

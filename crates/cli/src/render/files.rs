@@ -15,6 +15,9 @@ use crate::drawn::Drawn;
 use crate::progress::Progress;
 use crate::{Failure, save, say};
 
+/// What a stage of a picture may add to its error without a word.
+const MAX_STAGE_ERROR: f64 = 0.01;
+
 /// Hears how much is done, in [0, 1].
 pub(super) type Done<'a> = dyn Fn(f64) + Sync + 'a;
 
@@ -134,6 +137,12 @@ pub(crate) fn summary(output: &Path, report: &Report) -> String {
     if let Some(found) = error.measured {
         let rmse = found.measured_rmse;
         text += &format!("\nerror: max {:.5}, rmse {rmse:.6} against {}", found.measured_max, found.against);
+        let stages = error.budget.map(|budget| budget.above(MAX_STAGE_ERROR)).unwrap_or_default();
+        if !stages.is_empty() {
+            let stages: Vec<_> = stages.iter().map(|(stage, most)| format!("{stage} {most:.3}")).collect();
+            text +=
+                &format!("\nnote: stages that could add more than {MAX_STAGE_ERROR}: {}", stages.join(", "));
+        }
     }
     text
 }

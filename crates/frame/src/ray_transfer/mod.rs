@@ -338,3 +338,6 @@ fn sum_up(bins: &[Bin]) -> Vec<[f32; 4]> {
     }
     entries
 }
+
+#[cfg(test)]
+mod tests;

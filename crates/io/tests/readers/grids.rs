@@ -231,7 +231,7 @@ const VTU_LIES: &[(&str, &str, &str)] = &[
     ("NumberOfComponents=\"3\"", "NumberOfComponents=\"2\"", "Points: NumberOfComponents is 2, expected 3"),
     ("NumberOfComponents=\"3\"", "", "Points: NumberOfComponents is missing, expected 3"),
     ("<Points>", "<Point>", "the XML is damaged"),
-    ("Name=\"p\"", "Name=\"r\"", "array is 'p', expected one of 'r'"),
+    ("Name=\"p\"", "Name=\"r\"", "array is 'p', expected one of r"),
     ("Name=\"p\"", "Name=\"p\" NumberOfComponents=\"0\"", "p: NumberOfComponents is 0"),
     (
         "Name=\"p\"",

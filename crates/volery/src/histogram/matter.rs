@@ -5,8 +5,8 @@
 //!   has -3024 or -2000 outside its circle and air at -1000 inside. Padding is left out if the gap is many times as
 //!   long as the range of the rest, or if it is a tenth of it and the rest has an air of its own: a narrow peak below its
 //!   threshold. Without that a background of -1000 around tissue would count as padding.
-//! - *Fill*: values at the upper end that programs write where they know nothing: 1e15 and more, beside others that are
-//!   not, and 999, 9999 and the like.
+//! - *Fill*: values that programs write where they know nothing: 1e15 and more, or as far below 0, beside others that are
+//!   not; and at the upper end 999, 9999 and the like.
 //! - *Outliers*: as long as all but a thousandth of the samples are in an eighth of the bins, bins go over those
 //!   alone. The values outside keep the colour of the nearer end.
 //!
@@ -74,6 +74,10 @@ impl Histogram {
         if is_fill {
             let ceiling = edge(before + 1).min(high.next_down());
             return Some(Window { range: [low, ceiling], counted: [window.counted[0], ceiling] });
+        }
+        if low <= -HUGE && high > -HUGE {
+            let floor = edge(second).max(low.next_up());
+            return Some(Window { range: [floor, high], counted: [floor, window.counted[1]] });
         }
         // With two bins in use there is no saying which is the rest.
         if low >= 0.0 || used.len() == 2 {

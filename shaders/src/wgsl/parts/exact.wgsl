@@ -62,7 +62,8 @@ fn is_opaque_band(band: Band) -> bool {
 
 fn extinction_at(band: Band, u: f32) -> f32 {
     let opacity = clamp(band.opacity + band.opacity_slope * u, 0.0, 1.0);
-    let clearness = clamp(band.clearness - band.opacity_slope * u, 2.9802322e-8, 1.0);
+    let least = select(2.9802322e-8, 1e-37, band.opacity_slope == 0.0);
+    let clearness = clamp(band.clearness - band.opacity_slope * u, least, 1.0);
     return select(clear_log(opacity, clearness), OPAQUE, is_opaque_band(band));
 }
 

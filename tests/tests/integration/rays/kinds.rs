@@ -62,7 +62,7 @@ impl Judge {
         let tracer = Tracer::new(grid, &view.transfer).unwrap().with_tolerance(1e-9);
         let truth = tracer.render(&camera, BACKGROUND, size[0], size[1], &|_| {}).unwrap();
         let shown = truth.pixels().iter().filter(|&&pixel| pixel != BACKGROUND).count();
-        assert!(shown > truth.pixels().len() / 10, "{what}: matter in {shown} pixels only");
+        assert!(shown > truth.pixels().len() / 20, "{what}: matter in {shown} pixels only");
         let what = format!("{}, {what}", self.test);
         let found = distance(&what, &drawn, &truth);
         at_most("largest difference", found.max, MAX);
