@@ -122,7 +122,6 @@ impl WgpuBackend {
                 bands_buffer(gpu, rays.transfer),
             )
         })?;
-        let form = Form::new(layout, &units, rays.transfer, has_blanks);
         self.prepared = Some(Prepared {
             generation: pool.generation(),
             bricks: rays.bricks.to_vec(),
@@ -131,7 +130,7 @@ impl WgpuBackend {
             units_texture,
             transfer_texture,
             bands,
-            form,
+            form: Form::new(layout, has_blanks),
         });
         Ok(())
     }

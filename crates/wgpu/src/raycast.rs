@@ -9,10 +9,6 @@ use crate::bindings::{bind_group_layout, buffer};
 use crate::gpu::{Failure, Gpu};
 use crate::units::Units;
 
-/// The largest rise of light per unit length that a transfer function would have over all that can be seen, were it
-/// everywhere as steep as at its steepest, for which halves of cells are always good enough.
-const MAX_RISE: f64 = 4.0;
-
 /// Bytes of two numbers.
 const WORST_BYTES: u64 = 8;
 
@@ -35,27 +31,14 @@ pub(crate) struct Form {
     pub(crate) has_blanks: bool,
     /// Texels are whole numbers.
     pub(crate) is_whole: bool,
-    /// Cells may have to be integrated exactly.
-    pub(crate) has_exact: bool,
     /// Rays end at surfaces.
     pub(crate) has_surfaces: bool,
 }
 
 impl Form {
-    /// For units and a transfer function that may be too much for its table.
-    pub(crate) fn new(
-        layout: &VolumeLayout,
-        units: &Units,
-        transfer: &RayTransfer,
-        has_blanks: bool,
-    ) -> Self {
+    pub(crate) fn new(layout: &VolumeLayout, has_blanks: bool) -> Self {
         let is_whole = matches!(layout.texel, TexelType::U8 | TexelType::U16);
-        let window = transfer.entries().len() as f64 / transfer.bin_from_texel()[0];
-        let is_steep = transfer.slope() * window > MAX_RISE;
-        let is_marked =
-            |words: &[u32; 2]| words[0] & raycast::OCCUPIED != 0 && words[1] & raycast::EXACT != 0;
-        let has_exact = is_steep || units.words.iter().any(is_marked);
-        Self { has_blanks, is_whole, has_exact, has_surfaces: false }
+        Self { has_blanks, is_whole, has_surfaces: false }
     }
 }
 
@@ -211,7 +194,6 @@ fn pipeline(
             constants: &[
                 (raycast::HAS_BLANKS, f64::from(form.has_blanks)),
                 (raycast::IS_WHOLE, f64::from(form.is_whole)),
-                (raycast::HAS_EXACT, f64::from(form.has_exact)),
                 (raycast::HAS_SURFACES, f64::from(form.has_surfaces)),
             ],
             ..Default::default()

@@ -66,9 +66,6 @@ struct Frame {
 override HAS_BLANKS: bool = false;
 // Whether texels are whole numbers, which the atlas's formats round.
 override IS_WHOLE: bool = false;
-// Whether cells may have to be integrated exactly. What is not compiled costs nothing: on llvmpipe the code alone made
-// rays take almost three times as long.
-override HAS_EXACT: bool = true;
 // Whether rays end at surfaces.
 override HAS_SURFACES: bool = false;
 
@@ -359,7 +356,7 @@ fn light_along(ray: Ray) -> Light {
         let bend = abs(2.0 * far_middle - end.texel - far);
         let way = (t_far - t) * inverse_scale * ray.motion;
         let doubt = doubt_of_field(corners, bend, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
-        var is_exact = HAS_EXACT && ((light_behind > 0.0 && (words.y & EXACT) != 0u) || doubt > 4.0 * MAX_DOUBT);
+        var is_exact = (is_matter && !is_start && (words.y & EXACT) != 0u) || doubt > 4.0 * MAX_DOUBT;
         let is_halved = !is_exact && doubt > MAX_DOUBT;
         let t_next = select(t_far, 0.5 * (t + t_far), is_halved);
         let last = select(far, far_middle, is_halved);
@@ -371,8 +368,8 @@ fn light_along(ray: Ray) -> Light {
         let a = piece_to(end, balanced(end.texel, middle, last), depth);
         let b = piece_to(a.end, last, depth);
         let color_doubt = doubt_of_color(a, b) * light_behind;
-        is_exact = HAS_EXACT && (is_exact || color_doubt > MAX_DOUBT);
-        if HAS_EXACT && is_exact {
+        is_exact = is_exact || color_doubt > MAX_DOUBT;
+        if is_exact {
             let enter = (origin + t * ray.direction) * inverse_scale;
             let length = (t_next - t) * ray.depth_per_t * frame.depth_scale;
             let cubic = cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.motion);
