@@ -10,7 +10,7 @@ use volery_shaders::{ALL, BindingKind, Stages, cubes, raycast};
 fn every_wgsl_file_was_validated() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut pending = vec![folder.to_owned()];
-    let mut files = BTreeMap::new();
+    let (mut files, mut parts) = (BTreeMap::new(), Vec::new());
     while let Some(folder) = pending.pop() {
         for entry in std::fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
@@ -18,12 +18,24 @@ fn every_wgsl_file_was_validated() {
                 pending.push(path);
             } else if path.extension().is_some_and(|extension| extension == "wgsl") {
                 let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
-                files.insert(name, std::fs::read_to_string(&path).unwrap());
+                let text = std::fs::read_to_string(&path).unwrap();
+                if path.parent().unwrap().ends_with("parts") {
+                    parts.push((name, text));
+                } else {
+                    files.insert(name, text);
+                }
             }
         }
     }
     println!("{} shader files: {:?}", files.len(), files.keys());
     assert!(!files.is_empty(), "no .wgsl file under {}", folder.display());
+    // Behind a shader's own text stand the parts that it imports; no part is left over.
+    for (name, text) in &parts {
+        let import = format!("// import {name}\n");
+        let users: Vec<_> = files.iter_mut().filter(|(_, file)| file.contains(&import)).collect();
+        assert!(!users.is_empty(), "no shader imports the part {name}");
+        users.into_iter().for_each(|(_, file)| *file += &format!("\n{text}"));
+    }
     let all: BTreeMap<_, _> = ALL.iter().map(|&(name, text)| (name.to_owned(), text.to_owned())).collect();
     assert_eq!(files, all, "files on disk and shaders in the crate");
 }
