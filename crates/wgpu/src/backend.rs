@@ -122,6 +122,7 @@ impl WgpuBackend {
                 bands_buffer(gpu, rays.transfer),
             )
         })?;
+        let form = Form::new(layout, &units, has_blanks);
         self.prepared = Some(Prepared {
             generation: pool.generation(),
             bricks: rays.bricks.to_vec(),
@@ -130,7 +131,7 @@ impl WgpuBackend {
             units_texture,
             transfer_texture,
             bands,
-            form: Form::new(layout, has_blanks),
+            form,
         });
         Ok(())
     }

@@ -31,14 +31,18 @@ pub(crate) struct Form {
     pub(crate) has_blanks: bool,
     /// Texels are whole numbers.
     pub(crate) is_whole: bool,
+    /// There are cells for which the table is too coarse.
+    pub(crate) has_exact: bool,
     /// Rays end at surfaces.
     pub(crate) has_surfaces: bool,
 }
 
 impl Form {
-    pub(crate) fn new(layout: &VolumeLayout, has_blanks: bool) -> Self {
+    pub(crate) fn new(layout: &VolumeLayout, units: &Units, has_blanks: bool) -> Self {
         let is_whole = matches!(layout.texel, TexelType::U8 | TexelType::U16);
-        Self { has_blanks, is_whole, has_surfaces: false }
+        let is_marked =
+            |words: &[u32; 2]| words[0] & raycast::OCCUPIED != 0 && words[1] & raycast::EXACT != 0;
+        Self { has_blanks, is_whole, has_exact: units.words.iter().any(is_marked), has_surfaces: false }
     }
 }
 
@@ -194,6 +198,7 @@ fn pipeline(
             constants: &[
                 (raycast::HAS_BLANKS, f64::from(form.has_blanks)),
                 (raycast::IS_WHOLE, f64::from(form.is_whole)),
+                (raycast::HAS_EXACT, f64::from(form.has_exact)),
                 (raycast::HAS_SURFACES, f64::from(form.has_surfaces)),
             ],
             ..Default::default()

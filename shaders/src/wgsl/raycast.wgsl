@@ -2,8 +2,9 @@
 //
 // *Units* cover the volume evenly and say which brick is there, or how far around space is empty: a ray leaps
 // over such space. Elsewhere it visits the cells between samples: along a ray the trilinear field of a cell has no
-// kinks. Two straight pieces are integrated through the transfer function's antiderivative; where what that may be off
-// by is too much, or the table too coarse, the cubic itself is, from control point to control point.
+// kinks. Two straight pieces are integrated through the transfer function's antiderivative, of a stretch so short that
+// what that may be off by is little; where the table is too coarse, the cubic itself is, from control point to control
+// point.
 //
 // Texels are counted from `texel_origin`, in the units of the samples.
 //
@@ -66,6 +67,9 @@ struct Frame {
 override HAS_BLANKS: bool = false;
 // Whether texels are whole numbers, which the atlas's formats round.
 override IS_WHOLE: bool = false;
+// Whether there are cells for which the table is too coarse. What is not compiled costs nothing: on llvmpipe the code
+// of the exact way alone made rays take almost three times as long.
+override HAS_EXACT: bool = true;
 // Whether rays end at surfaces.
 override HAS_SURFACES: bool = false;
 
@@ -75,8 +79,9 @@ const BLANK: f32 = 1e38;
 const OPAQUE_DEPTH: f32 = 12.0;
 // Changes of the transfer function's antiderivative below this are none: their inverse might not be finite.
 const INVISIBLE: f32 = 1e-30;
-// The largest doubt of a stretch of ray, as a difference of a colour channel: beyond, it is halved, and where that
-// cannot be enough integrated exactly.
+// The largest doubt of a stretch of ray, as a difference of a colour channel: beyond, it is made shorter, but not than
+// a part of a cell: beside an outlier what can be seen is passed in less than that, and holds nothing.
+const MIN_STRETCH: f32 = 0.015625;
 const MAX_DOUBT: f32 = 0.002;
 // What a channel may be off by where a cell was integrated exactly, as a share of the light that it takes.
 const EXACT_DOUBT: f32 = 0.0025;
@@ -209,6 +214,11 @@ fn slice_place(corner: vec2f, z: f32) -> vec2f {
     return (corner + (frame.brick_cells + 1.0) * vec2f(z - row * frame.slices_per_row, row)) * frame.atlas_scale;
 }
 
+// A brick's cells per axis, from a unit's second word.
+fn cells_of(word: u32) -> vec3f {
+    return vec3f((vec3u(word) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));
+}
+
 fn corners_of_cell(slot: vec2u, cell: vec3f) -> Corners {
     let corner = vec2f(0.0, f32(slot.y) * frame.slot_height) + cell.xy + 1.0;
     let low = textureGather(0, atlas, atlas_sampler, slice_place(corner, cell.z), slot.x);
@@ -300,6 +310,11 @@ fn doubt_of_field(corners: Corners, bend: f32, way: vec3f) -> f32 {
     return (bend * (1.0 / 6.0) + twist * (1.0 / 16.0)) * frame.slope;
 }
 
+// The share of a stretch whose doubt is good: it falls with the third power.
+fn good_share(doubt: f32) -> f32 {
+    return exp2(log2(MAX_DOUBT / doubt) / 3.0);
+}
+
 // What the change of colour hides: within a piece the light of its front and its back are told apart by the
 // neighbouring piece only.
 fn doubt_of_color(a: Piece, b: Piece) -> f32 {
@@ -307,7 +322,7 @@ fn doubt_of_color(a: Piece, b: Piece) -> f32 {
     return depth * depth * largest(abs(b.color - a.color)) * (1.0 / 32.0);
 }
 
-// The light that a ray sees.
+// The light of the matter along a ray.
 //
 // One loop, each round of which leaves one box: a cell of a brick, or a cube of empty units. Nested loops would
 // make the rays of a SIMD group wait for one another at the end of each inner one.
@@ -322,6 +337,8 @@ fn light_along(ray: Ray) -> Light {
     // The texel at t, where the cell before was of the same level; its level, or none.
     var end = End(0.0, 0.0, vec4f(0.0));
     var end_level = NO_LEVEL;
+    // The longest stretch that the next round may take of a cell.
+    var reach = FAR;
     while t < t_end && light.depth < OPAQUE_DEPTH && all(place >= vec3f(0.0)) && all(place < frame.cells) {
         let unit = floor((place + 0.5) * frame.units_per_cell);
         let words = textureLoad(units, vec3i(unit), 0).xy;
@@ -329,12 +346,9 @@ fn light_along(ray: Ray) -> Light {
         let level = (words.x >> LEVEL_SHIFT) & LEVEL_MASK;
         let scale = power_of_2(127u + level);
         let inverse_scale = power_of_2(127u - level);
-        // Of the brick and its cell: lower corner.
-        let brick_size = scale * frame.brick_cells;
-        let brick_low = floor((place + 0.5) * (frame.bricks_per_cell * inverse_scale)) * brick_size;
+        let brick_low = floor((place + 0.5) * (frame.bricks_per_cell * inverse_scale)) * (scale * frame.brick_cells);
         let cell = floor((place + 0.5 - brick_low) * inverse_scale);
-        let cells = vec3f((vec3u(words.y) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));
-        let is_visible = is_occupied && all(cell < cells);
+        let is_visible = is_occupied && all(cell < cells_of(words.y));
         let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
         let stored = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
         let is_matter = is_visible && !is_blank(stored);
@@ -348,35 +362,37 @@ fn light_along(ray: Ray) -> Light {
         let exit = max(min(smallest(faces), t_end), t);
         // A round without length finds the value where a run of cells begins.
         let is_start = is_matter && level != end_level;
-        let t_far = select(exit, t, is_start);
+        let t_far = select(min(exit, t + reach), t, is_start);
         let origin = ray.start - low;
-        let far_middle = texel_at(corners, (origin + 0.5 * (t + t_far) * ray.direction) * inverse_scale);
-        let far = texel_at(corners, (origin + t_far * ray.direction) * inverse_scale);
         let light_behind = select(0.0, light.transmittance, is_matter && !is_start);
-        let bend = abs(2.0 * far_middle - end.texel - far);
+        let is_exact = HAS_EXACT && light_behind > 0.0 && (words.y & EXACT) != 0u;
+        var middle = texel_at(corners, (origin + 0.5 * (t + t_far) * ray.direction) * inverse_scale);
+        var last = texel_at(corners, (origin + t_far * ray.direction) * inverse_scale);
+        let bend = abs(2.0 * middle - end.texel - last);
         let way = (t_far - t) * inverse_scale * ray.motion;
-        let doubt = doubt_of_field(corners, bend, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
-        var is_exact = (is_matter && !is_start && (words.y & EXACT) != 0u) || doubt > 4.0 * MAX_DOUBT;
-        let is_halved = !is_exact && doubt > MAX_DOUBT;
-        let t_next = select(t_far, 0.5 * (t + t_far), is_halved);
-        let last = select(far, far_middle, is_halved);
-        var middle = far_middle;
-        if is_halved {
+        var doubt = doubt_of_field(corners, bend, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
+        var t_next = t_far;
+        if doubt > MAX_DOUBT && !is_exact {
+            t_next = min(t + max(good_share(doubt) * (t_far - t), MIN_STRETCH * scale), t_far);
             middle = texel_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) * inverse_scale);
+            last = texel_at(corners, (origin + t_next * ray.direction) * inverse_scale);
+            doubt = min(doubt, MAX_DOUBT);
         }
         let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);
         let a = piece_to(end, balanced(end.texel, middle, last), depth);
         let b = piece_to(a.end, last, depth);
         let color_doubt = doubt_of_color(a, b) * light_behind;
-        is_exact = is_exact || color_doubt > MAX_DOUBT;
+        if color_doubt > MAX_DOUBT && !is_exact && t_next - t > MIN_STRETCH * scale {
+            reach = 0.5 * (t_next - t);
+            continue;
+        }
+        reach = min(2.0 * reach, FAR);
         if is_exact {
-            let enter = (origin + t * ray.direction) * inverse_scale;
-            let length = (t_next - t) * ray.depth_per_t * frame.depth_scale;
-            let cubic = cubic_along(corners, enter, (t_next - t) * inverse_scale * ray.motion);
-            add_exactly(&light, cubic, vec2f(end.texel, last), range_of(corners), length);
+            let cubic = cubic_along(corners, (origin + t * ray.direction) * inverse_scale, way);
+            add_exactly(&light, cubic, vec2f(end.texel, last), range_of(corners), 2.0 * depth * frame.depth_scale);
             light.doubt += EXACT_DOUBT * (light_behind - light.transmittance);
         } else {
-            light.doubt += color_doubt + select(doubt, 0.125 * doubt, is_halved);
+            light.doubt += color_doubt + doubt;
             light.table_way += 2.0 * depth * light_behind;
             add_pair(&light, a, b);
         }
@@ -388,7 +404,6 @@ fn light_along(ray: Ray) -> Light {
         place = select(select(inside, beyond, faces <= vec3f(t_next)), place, vec3<bool>(is_start));
         t = t_next;
     }
-    light.color += light.transmittance * ray.behind;
     return light;
 }
 
@@ -405,8 +420,9 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     if pixel.x >= frame.width || pixel.y >= frame.end_row {
         return;
     }
-    let light = light_along(ray_of_pixel(pixel));
-    let color = light.color;
+    let ray = ray_of_pixel(pixel);
+    let light = light_along(ray);
+    let color = light.color + light.transmittance * ray.behind;
     atomicMax(&worst[0], bitcast<u32>(light.doubt));
     atomicMax(&worst[1], bitcast<u32>(light.table_way));
     let index = 3u * ((pixel.y - frame.first_row) * frame.width + pixel.x);
