@@ -82,7 +82,7 @@ const INVISIBLE: f32 = 1e-30;
 // The largest doubt of a stretch of ray, as a difference of a colour channel: beyond, it is made shorter, but not than
 // a part of a cell: beside an outlier what can be seen is passed in less than that, and holds nothing.
 const MIN_STRETCH: f32 = 0.015625;
-const MAX_DOUBT: f32 = 0.002;
+const MAX_DOUBT: f32 = 0.001;
 // What a channel may be off by where a cell was integrated exactly, as a share of the light that it takes.
 const EXACT_DOUBT: f32 = 0.0025;
 // Longer than any ray.
