@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use volery::glam::DVec3;
 use volery::output::write_image;
 use volery::{
-    Backend, Camera, Focus, Image, Picture, Plane, Projection, Sampling, Session, Technique, View,
-    ViewOptions, VoxelGrid,
+    Backend, Camera, Dial, Focus, How, Image, Picture, Plane, PlaneView, Projection, Sampling, View,
+    ViewOptions, VolumeData, VoxelGrid,
 };
 use volery_reference::metrics::{Comparison, compare};
 use volery_software::SoftwareBackend;
-use volery_tests::{Shared, Unblended, exact};
+use volery_tests::{Drawer, Shared, Unblended, exact, planes_of};
 
 /// Pictures are square, of so many pixels.
 const SIDE: u32 = 512;
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// A volume and how it is cut.
 struct Scene {
     name: &'static str,
-    session: Session,
+    session: Drawer<VolumeData>,
     backend: Shared,
     /// In full resolution.
     view: View,
@@ -61,11 +61,12 @@ impl Scene {
         let plane = Plane::through(extent / 2.0, DVec3::new(0.3, 0.5, 0.81)).normalized();
         let mut focus = extent * DVec3::new(0.45, 0.45, 0.5);
         if extent.z > 0.0 {
-            options.planes.planes = vec![plane];
+            let planes = PlaneView { planes: vec![plane], ..PlaneView::default() };
+            options.how = Some(How::Planes(planes));
             focus -= plane.normal * plane.signed_distance(focus);
         }
         let backend = Shared::new(Box::new(SoftwareBackend::new()));
-        let session = Session::open(grid, Box::new(backend.clone()), Technique::Plane)?;
+        let session = Drawer::volume(grid, Box::new(backend.clone()), How::Planes(PlaneView::default()))?;
         let view = session.view(&options);
         Ok(Self { name, session, backend, view, focus })
     }
@@ -85,8 +86,8 @@ impl Scene {
     /// With a focus of this quality, and what is near it within this error.
     fn focused(&self, quality: f64, max_error: Option<f64>) -> View {
         let mut view = self.view.clone();
-        view.planes.focus = Some(Focus { point: self.focus, quality });
-        view.planes.max_error = max_error;
+        planes_of(&mut view).focus = Some(Focus { point: self.focus, quality });
+        view.dial = max_error.map_or(Dial::Full, Dial::Error);
         view
     }
 
@@ -147,9 +148,9 @@ fn paper_table(scenes: &mut [Scene]) -> Result<(), Box<dyn Error>> {
         let full = scene.full()?;
         let mr = scene.draw(&scene.focused(1.0, None))?;
         let (fixed_work, mr_work) = (&full.picture.report.work, &mr.picture.report.work);
-        let cells = volery::technique::plane::BRICK_CELLS;
+        let cells = volery::data::BRICK_CELLS;
         let level_0: usize =
-            scene.session.grid().dims().iter().map(|n| (n - 1).div_ceil(cells).max(1)).product();
+            scene.session.data().grid().dims().iter().map(|n| (n - 1).div_ceil(cells).max(1)).product();
         println!(
             "| {} | {level_0} | {} / {} | {} / {} | {:.1} x | {:.1} / {:.1} | {:.1} / {:.1} | {:.3} | {} |",
             scene.name,
@@ -194,7 +195,7 @@ fn curve(scene: &mut Scene) -> Result<(), Box<dyn Error>> {
     }
     for max_error in ERRORS {
         let mut view = scene.view.clone();
-        view.planes.max_error = Some(max_error);
+        view.dial = Dial::Error(max_error);
         views.push((format!("error {max_error}"), view));
     }
     let full_bytes = full.picture.report.work.bytes_uploaded as f64;
@@ -254,10 +255,10 @@ fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
     ];
     let mut pictures = Vec::new();
     for (backend, sampling, shows_nodes) in rows {
-        let mut session = Session::open(grid.clone(), backend, Technique::Plane)?;
+        let mut session = Drawer::volume(grid.clone(), backend, How::Planes(PlaneView::default()))?;
         let mut view = session.view(&ViewOptions { width: 320, height: 320, ..ViewOptions::default() });
-        view.planes.focus = Some(Focus { point: DVec3::new(285.0, 285.0, 0.0), quality: 0.6 });
-        (view.planes.sampling, view.planes.shows_nodes) = (sampling, shows_nodes);
+        planes_of(&mut view).focus = Some(Focus { point: DVec3::new(285.0, 285.0, 0.0), quality: 0.6 });
+        (planes_of(&mut view).sampling, planes_of(&mut view).shows_nodes) = (sampling, shows_nodes);
         let target = DVec3::new(335.0, 335.0, 0.0);
         let projection = Projection::Orthographic { height: 160.0 };
         view.camera = Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection };
@@ -270,14 +271,15 @@ fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
 fn head(folder: &Path) -> Result<(), Box<dyn Error>> {
     let grid = volery_data::head([256, 320, 320], DVec3::splat(0.75));
     let plane = Plane::through(grid.extent() * 0.5, DVec3::new(0.75, 0.35, 0.55));
-    let mut session = Session::open(grid, Box::new(SoftwareBackend::new()), Technique::Plane)?;
+    let mut session =
+        Drawer::volume(grid, Box::new(SoftwareBackend::new()), How::Planes(PlaneView::default()))?;
     let mut options = ViewOptions { width: 420, height: 420, ..ViewOptions::default() };
-    options.planes.planes = vec![plane];
-    let eye = session.grid().extent() * DVec3::new(0.63, 0.14, 0.49);
-    options.planes.focus = Some(Focus { point: eye, quality: 0.8 });
+    let eye = session.data().grid().extent() * DVec3::new(0.63, 0.14, 0.49);
+    let focus = Some(Focus { point: eye, quality: 0.8 });
+    options.how = Some(How::Planes(PlaneView { planes: vec![plane], focus, ..PlaneView::default() }));
     let mut view = session.view(&options);
     let mut pictures = vec![session.render(&view)?.image];
-    view.planes.shows_nodes = true;
+    planes_of(&mut view).shows_nodes = true;
     pictures.push(session.render(&view)?.image);
     Ok(write_image(&folder.join("planes-head.png"), &sheet(&pictures))?)
 }

@@ -10,7 +10,7 @@ use std::path::Path;
 use volery::glam::DVec3;
 use volery::{InputData, Plane, View};
 use volery_reference::{GridTracer, PlaneScene};
-use volery_tests::view_of;
+use volery_tests::{values_of, view_of};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
@@ -22,7 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let input = volery::read_input(Path::new(scene), Some(Path::new(data)))?;
     let view = view_of(&input);
     let (width, height) = (view.width, view.height);
-    let View { camera, transfer, background, .. } = &view;
+    let View { camera, background, .. } = &view;
+    let transfer = values_of(&view);
     let truth = match (&input.data, plane) {
         (InputData::Grid(file), None) => {
             let array = file.array.as_ref().ok_or("a grid without an array")?;

@@ -7,6 +7,7 @@
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
+use volery_tests::Drawer;
 
 use glam::DVec3;
 use meshoptimizer_rs::Workspace;
@@ -14,7 +15,7 @@ use meshoptimizer_rs::codec::{
     IndexEncoding, VertexEncoding, decode_index_buffer, decode_vertex_buffer, encode_index_buffer,
     encode_vertex_buffer,
 };
-use volery::{BackendChoice, GridSession, Slices, open_backend};
+use volery::{BackendChoice, Slices, open_backend};
 use volery_io::{GridOptions, read_grid};
 use volery_slicing::{CompactMesh, Planes, QuantizedMesh, Slicer};
 
@@ -34,8 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let slicer = Slicer::new(file.grid.clone())?;
         let stack = slicer.slice(&Planes::over(slicer.grid(), NORMAL, num_planes)?)?;
         let num_corners = stack.sections().map(|(_, section)| section.corners().len()).sum::<usize>();
-        let session = GridSession::open(file.grid, None, open_backend(BackendChoice::Software)?)?;
-        made.push(Made { name, num_corners, slices: session.slices(NORMAL, num_planes)? });
+        let session = Drawer::grid(file.grid, None, open_backend(BackendChoice::Software)?)?;
+        made.push(Made { name, num_corners, slices: session.data().slices(NORMAL, num_planes)? });
     }
     print_bytes(&made);
     print_coders(&made)

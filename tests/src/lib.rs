@@ -9,19 +9,21 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use volery::{
-    Backend, BackendChoice, Image, Input, Picture, PlaneView, Session, StackView, Thickness, View,
-    open_backend, read_input,
+    Backend, BackendChoice, Data, Dial, How, Image, Input, InputData, Picture, StackView, View, open_backend,
+    read_input,
 };
 use volery_frame::{
-    Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, UploadError, VolumeLayout,
+    Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, Revision, UploadError, VolumeLayout,
 };
 use volery_io::SceneFile;
 use volery_io::scene_file::SceneTransfer;
 use volery_reference::metrics::{Comparison, compare};
 use volery_scene::{Camera, TransferFunction, VoxelGrid};
 
+mod drawer;
 mod shared;
 
+pub use drawer::{Drawer, planes_of, stack_of, values_of, with_stack};
 pub use shared::Shared;
 
 /// The folder of real data: `VOLERY_DATA`, or `../shared/data` from the root of the workspace. `None` means that
@@ -68,7 +70,9 @@ pub fn view_of(input: &Input) -> View {
     let camera = scene.camera.expect("a scene with a camera");
     let background = scene.background.expect("a scene with a background");
     let view = matter_view(camera, transfer_of(scene).clone(), background, size);
-    View { meshes: input.meshes.clone(), ..view }
+    let is_grid = matches!(input.data, InputData::Grid(_));
+    let how = if is_grid { How::Stack(StackView::default()) } else { How::Raycast };
+    View { meshes: input.meshes.clone(), how, ..view }
 }
 
 /// A view of all matter in full resolution, in front of `background`.
@@ -78,18 +82,9 @@ pub fn matter_view(
     background: [f64; 3],
     [width, height]: [u32; 2],
 ) -> View {
-    View {
-        width,
-        height,
-        camera,
-        transfer,
-        background,
-        tolerance: None,
-        planes: PlaneView::default(),
-        thickness: Thickness::default(),
-        stack: StackView::default(),
-        meshes: [].into(),
-    }
+    let meshes = [].into();
+    let (transfer, dial, how) = (transfer.into(), Dial::Full, How::Raycast);
+    View { width, height, camera, background, meshes, transfer, dial, how }
 }
 
 /// The transfer function of a scene that has one over values.
@@ -122,7 +117,7 @@ pub fn backend(choice: BackendChoice, test: &str) -> Option<Box<dyn Backend>> {
 ///
 /// # Panics
 /// When it cannot be drawn.
-pub fn draw(session: &mut Session, view: &View) -> Picture {
+pub fn draw<D: Data>(session: &mut Drawer<D>, view: &View) -> Picture {
     session.render(view).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -185,6 +180,10 @@ impl<B: Backend> Backend for Unblended<B> {
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
         self.0.set_volume(layout)
+    }
+
+    fn volume(&self) -> Option<Revision> {
+        self.0.volume()
     }
 
     fn is_resident(&self, id: BrickId) -> bool {

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use volery::Backend;
-use volery_frame::{Brick, BrickId, Device, DrawError, Drawn, Frame, UploadError, VolumeLayout};
+use volery_frame::{Brick, BrickId, Device, DrawError, Drawn, Frame, Revision, UploadError, VolumeLayout};
 
 /// A backend of which more than one has hold. It holds the bricks of the session that was opened last.
 #[derive(Clone)]
@@ -44,6 +44,10 @@ impl Backend for Shared {
         let mut state = self.lock();
         state.layout = Some(*layout);
         state.backend.set_volume(layout)
+    }
+
+    fn volume(&self) -> Option<Revision> {
+        self.lock().backend.volume()
     }
 
     fn is_resident(&self, id: BrickId) -> bool {

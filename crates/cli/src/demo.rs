@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use volery::glam::DVec3;
 use volery::output::{ErrorMap, write_image};
 use volery::{
-    BackendChoice, ColorMap, Focus, GridSession, Picture, PlaneView, Preset, Session, Slicing, StackView,
-    Technique, View, ViewOptions, VoxelGrid, fit, open_backend, reference,
+    Backend, BackendChoice, ColorMap, Data, Dial, Focus, GridData, How, Picture, PlaneView, Preset, Session,
+    Slicing, StackView, Thickness, View, ViewOptions, VolumeData, VoxelGrid, fit, open_backend, reference,
 };
 
 use crate::args::DemoArgs;
@@ -76,11 +76,11 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::of_file(folder, format_args!("cannot be made: {error}")))?;
     say("data            picture             ms a frame  pieces  max error      rmse")?;
-    let mut sheet = Sheet { folder, tiles: Vec::new() };
+    let mut sheet = Sheet { folder, backend: open_backend(choice)?, tiles: Vec::new() };
     for scene in scenes() {
-        sheet.draw_scene(&scene, args.backend.into())?;
+        sheet.draw_scene(&scene)?;
     }
-    sheet.draw_cells(args.backend.into())?;
+    sheet.draw_cells()?;
     let file = folder.join("contact-sheet.png");
     write_image(&file, &contact_sheet(&sheet.tiles, COLUMNS))?;
     say(file.display())
@@ -89,92 +89,91 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
 /// The pictures so far.
 struct Sheet<'a> {
     folder: &'a Path,
+    backend: Box<dyn Backend>,
     tiles: Vec<Tile>,
 }
 
 impl Sheet<'_> {
-    fn draw_scene(&mut self, scene: &Scene, choice: BackendChoice) -> Result<(), Failure> {
-        let open = |technique: Technique| {
+    fn draw_scene(&mut self, scene: &Scene) -> Result<(), Failure> {
+        let mut session = {
             let _busy = Progress::spinner(format!("building the pyramid of {}", scene.name));
-            Ok::<_, Failure>(Session::open(scene.grid.clone(), open_backend(choice)?, technique)?)
+            Session::new(VolumeData::new(scene.grid.clone())?)
         };
-        let mut rays = open(Technique::Raycast)?;
         let options = ViewOptions {
             width: SIDE,
             height: SIDE,
             direction: Some(scene.direction),
-            transfer: Some(rays.preset(scene.preset)),
+            transfer: Some(session.preset(scene.preset).into()),
             ..ViewOptions::default()
         };
-        let full = rays.view(&options);
-        let parallel = rays.view(&ViewOptions { orthographic: true, ..options.clone() });
-        let [fine, coarse] = TOLERANCES.map(|tolerance| View { tolerance: Some(tolerance), ..full.clone() });
-        let name = scene.name;
-        self.draw(&mut rays, &full, [name, "full resolution"], false)?;
-        self.draw(&mut rays, &parallel, [name, "orthographic"], false)?;
-        self.draw(&mut rays, &fine, [name, &format!("tolerance {}", TOLERANCES[0])], false)?;
-        self.draw(&mut rays, &coarse, [name, &format!("tolerance {}", TOLERANCES[1])], true)?;
-
-        let mut planes = open(Technique::Plane)?;
+        let full = session.view(&options);
+        let coarser = |tolerance| View { dial: Dial::Tolerance(tolerance), ..full.clone() };
         let focus = Some(Focus { point: scene.grid.extent() / 2.0, quality: PLANE_QUALITY });
-        let view =
-            planes.view(&ViewOptions { planes: PlaneView { focus, ..PlaneView::default() }, ..options });
-        self.draw(&mut planes, &view, [name, "planes, focus"], false)?;
-
-        let mut fans = open(Technique::Fans)?;
-        let view = View { tolerance: Some(FANS_TOLERANCE), ..full };
-        self.draw(&mut fans, &view, [name, &format!("fans, tol. {FANS_TOLERANCE}")], false)
+        let planes = How::Planes(PlaneView { focus, ..PlaneView::default() });
+        let views = [
+            ("full resolution".to_owned(), full.clone(), false),
+            (
+                "orthographic".to_owned(),
+                session.view(&ViewOptions { orthographic: true, ..options.clone() }),
+                false,
+            ),
+            (format!("tolerance {}", TOLERANCES[0]), coarser(TOLERANCES[0]), false),
+            (format!("tolerance {}", TOLERANCES[1]), coarser(TOLERANCES[1]), true),
+            ("planes, focus".to_owned(), session.view(&ViewOptions { how: Some(planes), ..options }), false),
+            (
+                format!("fans, tol. {FANS_TOLERANCE}"),
+                View { how: How::Fans(Thickness::default()), ..coarser(FANS_TOLERANCE) },
+                false,
+            ),
+        ];
+        for (title, view, maps_error) in views {
+            self.draw(&mut session, &view, [scene.name, &title], maps_error)?;
+        }
+        Ok(())
     }
 
     /// Cells of several types, sliced.
-    fn draw_cells(&mut self, choice: BackendChoice) -> Result<(), Failure> {
-        let name = "cylinder";
-        let mut session = GridSession::open(volery_data::cylinder(CELLS), None, open_backend(choice)?)?;
+    fn draw_cells(&mut self) -> Result<(), Failure> {
+        let mut session = Session::new(GridData::new(volery_data::cylinder(CELLS), None)?);
         let direction = Some(fit::Direction { azimuth_deg: -25.0, elevation_deg: 30.0, zoom: 1.1 });
         let options = ViewOptions { width: SIDE, height: SIDE, direction, ..ViewOptions::default() };
-        let options = ViewOptions { transfer: Some(session.preset(Preset::Auto)), ..options };
+        let options = ViewOptions { transfer: Some(session.preset(Preset::Auto).into()), ..options };
         let full = session.view(&options);
         let parallel = session.view(&ViewOptions { orthographic: true, ..options });
-        let of = |stack: StackView| View { stack, ..full.clone() };
-        let few = StackView { num_slices: FEW_SLICES, ..full.stack.clone() };
+        let of = |stack: StackView| View { how: How::Stack(stack), ..full.clone() };
+        let all = StackView::default();
+        let few = StackView { num_slices: FEW_SLICES, ..all.clone() };
         let views = [
             ("slices", full.clone(), false),
             ("orthographic", parallel, false),
-            ("along axes", of(StackView { slicing: Slicing::Axes, ..full.stack.clone() }), false),
+            ("along axes", of(StackView { slicing: Slicing::Axes, ..all.clone() }), false),
             ("few and finer", of(StackView { adaptive: Some(1.0), ..few.clone() }), false),
             ("few slices", of(few), true),
-            ("shaded", of(StackView { is_lit: true, ..full.stack.clone() }), false),
+            ("shaded", of(StackView { is_lit: true, ..all }), false),
         ];
         for (title, view, maps_error) in views {
-            let (picture, truth) = {
-                let bar = Progress::bar(format!("{name}, {title}"));
-                let mut picture = session.render_frames(&view, FRAMES)?;
-                // The reference knows no light.
-                let knows = !view.stack.is_lit;
-                let verify = |picture| session.verify(&view, picture, &|done| bar.set(done));
-                let truth = knows.then(|| verify(&mut picture)).transpose()?;
-                (picture, truth)
-            };
-            self.add([name, title], picture, truth.as_ref(), maps_error)?;
+            self.draw(&mut session, &view, ["cylinder", title], maps_error)?;
         }
         Ok(())
     }
 
     /// Draws, measures, prints and writes one picture, and the map of its error if that is wanted.
-    fn draw(
+    fn draw<D: Data>(
         &mut self,
-        session: &mut Session,
+        session: &mut Session<D>,
         view: &View,
         [name, title]: [&str; 2],
         maps_error: bool,
     ) -> Result<(), Failure> {
         let (picture, truth) = {
             let bar = Progress::bar(format!("{name}, {title}"));
-            let mut picture = session.render_frames(view, FRAMES)?;
-            let truth = session.verify(view, &mut picture, &|done| bar.set(done))?;
+            let mut picture = session.render_frames(view, FRAMES, self.backend.as_mut())?;
+            // The reference knows no light.
+            let verify = |picture| session.verify(view, picture, &|done| bar.set(done));
+            let truth = view.check_verifiable().is_ok().then(|| verify(&mut picture)).transpose()?;
             (picture, truth)
         };
-        self.add([name, title], picture, Some(&truth), maps_error)
+        self.add([name, title], picture, truth.as_ref(), maps_error)
     }
 
     /// Prints and writes one picture, and the map of its error if that is wanted and there is a truth.

@@ -5,7 +5,6 @@
 
 mod args;
 mod demo;
-mod drawn;
 mod extent;
 mod info;
 mod interrupts;

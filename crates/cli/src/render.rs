@@ -7,15 +7,13 @@ use volery::io::is_grid;
 use volery::io::scene_file::{SceneBackend, SceneFile, SceneTechnique};
 use volery::output::write_image;
 use volery::{
-    Backend, BackendChoice, Input, InputData, InputOptions, Picture, RenderError, Session, Step, View,
-    VoxelGrid, open_backend,
+    Backend, BackendChoice, Data, How, Input, InputData, InputOptions, Picture, RenderError, Session, Step,
+    View, VolumeData, VoxelGrid, open_backend,
 };
 
 mod empty;
 mod files;
 mod grid;
-
-use files::Done;
 
 use crate::args::{RenderArgs, Transfer, numbered};
 use crate::outputs::Outputs;
@@ -63,7 +61,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if choice.loads_drivers() {
         quiet::hush_drivers();
     }
-    let backend = open_backend(choice)?;
+    let mut backend = open_backend(choice)?;
+    let backend = backend.as_mut();
     let input = {
         let _busy = Progress::spinner("reading");
         plan.read()?
@@ -109,28 +108,22 @@ fn outputs(args: &RenderArgs, num_steps: usize) -> Outputs {
     }
 }
 
-/// The technique for a volume, and the option that chose it where nobody named one.
-fn technique(wanted: &SceneFile, grid: &VoxelGrid) -> (volery::Technique, Option<Given>) {
-    let suiting = volery::Technique::suiting(grid);
+/// How a volume is drawn, and the option that chose planes where nobody named a technique.
+fn how(wanted: &SceneFile, volume: &VolumeData) -> (How, Option<Given>) {
+    let suiting = wanted::technique_of(&volume.suiting());
     let for_planes = || {
         let given = wanted::given(wanted, false);
         given.into_iter().find(|option| option.technique == SceneTechnique::Plane)
     };
-    match wanted.technique {
-        Some(SceneTechnique::Raycast) => (volery::Technique::Raycast, None),
-        Some(SceneTechnique::Fans) => (volery::Technique::Fans, None),
-        Some(SceneTechnique::Plane) => (volery::Technique::Plane, None),
-        _ => match for_planes() {
-            Some(option) => {
-                let is_other = suiting != volery::Technique::Plane;
-                (volery::Technique::Plane, is_other.then_some(option))
-            }
-            None => (suiting, None),
-        },
-    }
+    let (technique, because) = match (wanted.technique, for_planes()) {
+        (Some(technique), _) => (technique, None),
+        (None, Some(option)) => (SceneTechnique::Plane, (suiting != SceneTechnique::Plane).then_some(option)),
+        (None, None) => (suiting, None),
+    };
+    (wanted::how(wanted, technique), because)
 }
 
-fn run_volume(run: &Run, grid: &VoxelGrid, backend: Box<dyn Backend>) -> Result<(), Failure> {
+fn run_volume(run: &Run, grid: &VoxelGrid, backend: &mut dyn Backend) -> Result<(), Failure> {
     let Run { args, wanted, input, .. } = run;
     if wanted.technique == Some(SceneTechnique::Stack) {
         return Err(needs_grid(input, "--technique stack"));
@@ -141,29 +134,22 @@ fn run_volume(run: &Run, grid: &VoxelGrid, backend: Box<dyn Backend>) -> Result<
     if let Some(option) = of_stack.map(|option| option.to_string()).or(steps) {
         return Err(needs_grid(input, &option));
     }
-    let (technique, because) = technique(wanted, grid);
     let mut session = {
         let _busy = Progress::spinner("building the pyramid");
-        let opened = Session::open(grid.clone(), backend, technique);
-        opened.map_err(|error| Failure::of_file(&input.path, error))?
+        let volume = VolumeData::new(grid.clone());
+        Session::new(volume.map_err(|error| Failure::of_file(&input.path, error))?)
     };
-    let view = wanted::view(args, wanted, input, &session)?;
+    let (how, because) = how(wanted, session.data());
+    let view = wanted::view(args, wanted, input, &session, how)?;
     if let Some(folder) = &args.progressive {
-        progressive(folder, &mut session, &view, input)?;
+        progressive(folder, (&mut session, backend), &view, input)?;
     }
     let picture = {
         let _busy = Progress::spinner("drawing");
-        let drawn = session.render_frames(&view, args.frames as usize);
+        let drawn = session.render_frames(&view, args.frames as usize, backend);
         drawn.map_err(|error| Failure::of_file(&input.path, error))?
     };
-    let verify = |picture: &mut Picture, progress: &Done| session.verify(&view, picture, progress);
-    let technique = match technique {
-        volery::Technique::Raycast => SceneTechnique::Raycast,
-        volery::Technique::Plane => SceneTechnique::Plane,
-        volery::Technique::Fans => SceneTechnique::Fans,
-    };
-    let verify: Option<&files::Verify> = if args.is_verified() { Some(&verify) } else { None };
-    files::finish(run, (&view, technique), picture, verify, &session)?;
+    files::finish(run, &view, picture, &session)?;
     if let Some(option) = because {
         say(format_args!("note: drawn by --technique plane, which alone reads {option}"))?;
     }
@@ -175,17 +161,22 @@ fn needs_grid(input: &Input, option: &str) -> Failure {
 }
 
 /// Writes each picture on the way to the last one, `00.png` first, with its report beside it.
-fn progressive(folder: &Path, session: &mut Session, view: &View, input: &Input) -> Result<(), Failure> {
+fn progressive(
+    folder: &Path,
+    (session, backend): (&mut Session<VolumeData>, &mut dyn Backend),
+    view: &View,
+    input: &Input,
+) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::of_file(folder, format_args!("cannot be made: {error}")))?;
     let of_file = |error| Failure::of_file(&input.path, error);
-    let steps: Box<dyn Iterator<Item = Result<Step, RenderError>>> = match session.technique() {
-        volery::Technique::Plane => {
-            let num_bricks = session.progressive(view, None, 1).map_err(of_file)?.num_bricks();
+    let steps: Box<dyn Iterator<Item = Result<Step, RenderError>>> = match view.how {
+        How::Planes(_) => {
+            let num_bricks = session.progressive(view, None, 1, backend).map_err(of_file)?.num_bricks();
             let each = num_bricks.div_ceil(PROGRESSIVE_STEPS);
-            Box::new(session.progressive(view, None, each).map_err(of_file)?)
+            Box::new(session.progressive(view, None, each, backend).map_err(of_file)?)
         }
-        _ => Box::new(session.refinements(view).map_err(of_file)?),
+        _ => Box::new(session.refinements(view, backend).map_err(of_file)?),
     };
     for (number, step) in steps.enumerate() {
         let step = step.map_err(of_file)?;

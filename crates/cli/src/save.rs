@@ -2,16 +2,16 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use volery::io::scene_file::{SceneFile, SceneMesh, ScenePlane, SceneTechnique, SceneTransfer};
-use volery::{Plane, View};
+use volery::io::scene_file::{SceneFile, SceneMesh, ScenePlane, SceneTransfer};
+use volery::{How, Plane, Transfer, View};
 
-use crate::Failure;
+use crate::{Failure, wanted};
 
 /// Writes what was wanted, with everything that was left open as it was found for this view.
 pub(crate) fn save_scene(
     path: &Path,
     wanted: &SceneFile,
-    (view, technique): (&View, SceneTechnique),
+    view: &View,
     has_colors: bool,
 ) -> Result<(), Failure> {
     let mut scene = wanted.clone();
@@ -22,17 +22,17 @@ pub(crate) fn save_scene(
     scene.size = Some([view.width, view.height]);
     scene.background = Some(view.background);
     scene.camera = Some(view.camera);
-    scene.technique = Some(technique);
-    let transfer = match &view.stack.classification {
-        Some(function) => SceneTransfer::Magnitudes(function.as_ref().clone()),
-        None => SceneTransfer::Values(view.transfer.clone()),
+    scene.technique = Some(wanted::technique_of(&view.how));
+    let transfer = match &view.transfer {
+        Transfer::Magnitudes(function) => SceneTransfer::Magnitudes(function.as_ref().clone()),
+        Transfer::Values(transfer) => SceneTransfer::Values(transfer.clone()),
     };
     (scene.transfer, scene.range) = ((!has_colors).then_some(transfer), None);
     // An infinite quality is full resolution, as without a focus; JSON has no infinity.
     scene.focus = scene.focus.filter(|focus| focus.quality.is_finite());
-    if technique == SceneTechnique::Plane {
+    if let How::Planes(planes) = &view.how {
         let plane = |plane: &Plane| ScenePlane { normal: plane.normal.to_array(), distance: plane.distance };
-        scene.planes = view.planes.planes.iter().map(plane).collect();
+        scene.planes = planes.planes.iter().map(plane).collect();
     }
     Ok(scene.write(path)?)
 }

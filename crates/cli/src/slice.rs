@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Instant;
 
 use volery::io::{GlbOptions, GridOptions, read_grid, recording_files};
-use volery::{BackendChoice, GridSession, SliceCounts, open_backend};
+use volery::{GridData, SliceCounts};
 
 use crate::args::SliceArgs;
 use crate::outputs::Outputs;
@@ -20,10 +20,9 @@ pub(crate) fn run(args: &SliceArgs) -> Result<(), Failure> {
     let file = file?;
     outputs.check_inputs(opened.iter().map(|file| file.path.as_path()))?;
     extent::check(&args.input, &file.grid, args.count as usize, Some(args.axis))?;
-    let backend = open_backend(BackendChoice::Software)?;
-    let opened = GridSession::open(file.grid, args.array.as_deref(), backend);
-    let session = opened.map_err(|error| Failure::of_file(&args.input, error))?;
-    let sliced = session.slices(args.axis, args.count as usize);
+    let opened = GridData::new(file.grid, args.array.as_deref());
+    let grid = opened.map_err(|error| Failure::of_file(&args.input, error))?;
+    let sliced = grid.slices(args.axis, args.count as usize);
     let slices = sliced.map_err(|error| Failure::of_file(&args.input, error))?;
     let start = Instant::now();
     let is_glb = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("glb"));
@@ -35,7 +34,7 @@ pub(crate) fn run(args: &SliceArgs) -> Result<(), Failure> {
     let write_seconds = start.elapsed().as_secs_f64();
     drop(busy);
     say(Table {
-        array: session.array(),
+        array: grid.array(),
         distance: slices.distance,
         counts: slices.counts,
         file_bytes,

@@ -11,13 +11,12 @@ use volery::io::scene_file::{
 use volery::io::transfer::{TransferError, TransferOptions, TransferProblem};
 use volery::io::{one_of, read_transfer, read_transfer_2d};
 use volery::{
-    Focus, Input, InputData, Plane, PlaneView, Preset, Sampling, Slicing, StackView, Thickness, View,
-    ViewOptions,
+    Data, Dial, Focus, How, Input, InputData, Plane, PlaneView, Preset, Sampling, Session, Slicing,
+    StackView, Thickness, View, ViewOptions,
 };
 
 use crate::Failure;
 use crate::args::{BackendName, RenderArgs, Technique, Transfer};
-use crate::drawn::Drawn;
 
 /// An option that one technique alone reads, as the command line or a scene writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +46,29 @@ pub(crate) fn name_of(technique: SceneTechnique) -> &'static str {
     }
 }
 
+/// The technique by which a view is drawn, as a scene names it.
+pub(crate) fn technique_of(how: &How) -> SceneTechnique {
+    match how {
+        How::Raycast => SceneTechnique::Raycast,
+        How::Planes(_) => SceneTechnique::Plane,
+        How::Fans(_) => SceneTechnique::Fans,
+        How::Stack(_) | How::Slices { .. } => SceneTechnique::Stack,
+    }
+}
+
+/// What is wanted of a technique.
+pub(crate) fn how(wanted: &SceneFile, technique: SceneTechnique) -> How {
+    match technique {
+        SceneTechnique::Raycast => How::Raycast,
+        SceneTechnique::Plane => How::Planes(plane_view(wanted)),
+        SceneTechnique::Fans => How::Fans(match wanted.thickness {
+            Some(SceneThickness::Interpolated) => Thickness::Interpolated,
+            Some(SceneThickness::Exact) | None => Thickness::Exact,
+        }),
+        SceneTechnique::Stack => How::Stack(stack_view(wanted)),
+    }
+}
+
 /// What is given that one technique alone reads.
 pub(crate) fn given(wanted: &SceneFile, is_of_scene: bool) -> Vec<Given> {
     use SceneTechnique::{Fans, Plane, Stack};
@@ -70,6 +92,10 @@ pub(crate) fn given(wanted: &SceneFile, is_of_scene: bool) -> Vec<Given> {
 
 /// Why options that one technique alone reads cannot stand together, or beside the technique asked for.
 pub(crate) fn conflict(wanted: &SceneFile, is_of_scene: bool) -> Option<String> {
+    if wanted.tolerance.is_some() && wanted.error.is_some() {
+        let prefix = if is_of_scene { "" } else { "--" };
+        return Some(format!("{prefix}tolerance and {prefix}error exclude each other, expected one dial"));
+    }
     let given = given(wanted, is_of_scene);
     let alone =
         |option: &Given| format!("{option} is read by --technique {} alone", name_of(option.technique));
@@ -145,24 +171,26 @@ fn scene_backend(backend: BackendName) -> Option<SceneBackend> {
 }
 
 /// The view that is wanted of a session's data.
-pub(crate) fn view(
+pub(crate) fn view<D: Data>(
     args: &RenderArgs,
     wanted: &SceneFile,
     input: &Input,
-    session: &dyn Drawn,
+    session: &Session<D>,
+    mut how: How,
 ) -> Result<View, Failure> {
     check_applies(args, wanted, input, session)?;
-    let mut stack = stack_view(wanted);
     let transfer = match load_transfer(args, wanted, session)? {
         None => None,
-        Some(SceneTransfer::Values(function)) => Some(function),
+        Some(SceneTransfer::Values(function)) => Some(function.into()),
         Some(SceneTransfer::Magnitudes(function)) => {
-            (stack.classification, stack.is_lit) = (Some(function.into()), true);
-            None
+            if let How::Stack(StackView { is_lit, .. }) | How::Slices { is_lit } = &mut how {
+                *is_lit = true;
+            }
+            Some(volery::Transfer::Magnitudes(function.into()))
         }
         Some(SceneTransfer::Preset(name)) => {
             let preset = Preset::from_name(&name).ok_or_else(|| unknown_preset(&name))?;
-            Some(session.preset(preset, wanted.range))
+            Some(session.data().preset_over(preset, wanted.range).into())
         }
     };
     let defaults = ViewOptions::default();
@@ -174,35 +202,34 @@ pub(crate) fn view(
         orthographic: args.orthographic,
         transfer,
         range: wanted.range,
-        planes: plane_view(wanted),
-        stack,
+        how: Some(how),
     };
     let mut view = session.view(&options);
     if let Some(camera) = wanted.camera {
         view.camera = if args.orthographic { fit::orthographic(&camera) } else { camera };
     }
     view.background = wanted.background.unwrap_or(view.background);
-    view.tolerance = wanted.tolerance;
-    view.thickness = match wanted.thickness {
-        Some(SceneThickness::Interpolated) => Thickness::Interpolated,
-        Some(SceneThickness::Exact) | None => Thickness::Exact,
+    view.dial = match (wanted.tolerance, wanted.error) {
+        (Some(tolerance), _) => Dial::Tolerance(tolerance),
+        (None, Some(error)) => Dial::Error(error),
+        (None, None) => Dial::Full,
     };
     view.meshes = input.meshes.clone();
     Ok(view)
 }
 
 /// Refuses options that the data, or the transfer function, have no use for.
-fn check_applies(
+fn check_applies<D: Data>(
     args: &RenderArgs,
     wanted: &SceneFile,
     input: &Input,
-    session: &dyn Drawn,
+    session: &Session<D>,
 ) -> Result<(), Failure> {
     let own_colors = |option: &str, expected: &str| {
         let problem = format!("samples are colours of their own, expected {expected} for {option}");
         Err(Failure::of_file(&input.path, problem))
     };
-    if session.has_colors() {
+    if session.data().has_colors() {
         let number = "one channel of numbers";
         if args.transfer.is_some() {
             return own_colors("--transfer", number);
@@ -247,7 +274,6 @@ fn plane_view(wanted: &SceneFile) -> PlaneView {
     PlaneView {
         planes: wanted.planes.iter().map(plane).collect(),
         focus: wanted.focus.map(focus),
-        max_error: wanted.error,
         sampling: if wanted.nearest { Sampling::Nearest } else { Sampling::Linear },
         is_transparent: wanted.transparent,
         shows_nodes: wanted.show_nodes,
@@ -262,15 +288,14 @@ fn stack_view(wanted: &SceneFile) -> StackView {
         adaptive: wanted.adaptive,
         is_lit: wanted.shade,
         is_quantized: wanted.quantized,
-        ..defaults
     }
 }
 
 /// The transfer function of the command line's file, or else of the scene.
-fn load_transfer(
+fn load_transfer<D: Data>(
     args: &RenderArgs,
     wanted: &SceneFile,
-    session: &dyn Drawn,
+    session: &Session<D>,
 ) -> Result<Option<SceneTransfer>, Failure> {
     let Some(Transfer::File(path)) = &args.transfer else { return Ok(wanted.transfer.clone()) };
     let options = TransferOptions {
@@ -283,7 +308,9 @@ fn load_transfer(
             Err(has_own_values(&path.display().to_string()))
         }
         Ok(named) => Ok(Some(SceneTransfer::Values(named.transfer))),
-        Err(TransferError { problem: TransferProblem::HasMagnitudes, .. }) if session.knows_gradients() => {
+        Err(TransferError { problem: TransferProblem::HasMagnitudes, .. })
+            if session.data().has_magnitudes() =>
+        {
             Ok(Some(SceneTransfer::Magnitudes(read_transfer_2d(path)?)))
         }
         Err(error @ TransferError { problem: TransferProblem::Choice { .. }, .. }) => {

@@ -1,6 +1,6 @@
 //! The trait of executors.
 
-use crate::{Brick, BrickId, Content, Frame, TexelType, VolumeLayout, planes, sheets};
+use crate::{Brick, BrickId, Content, Frame, Revision, TexelType, VolumeLayout, planes, sheets};
 
 /// A picture in linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,6 +173,9 @@ pub trait Backend: Send {
     /// # Errors
     /// When the device cannot hold bricks of this layout at all.
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError>;
+
+    /// The revision of the volume whose bricks it holds; `None` before [`Backend::set_volume`].
+    fn volume(&self) -> Option<Revision>;
 
     /// Whether a brick is resident.
     fn is_resident(&self, id: BrickId) -> bool;

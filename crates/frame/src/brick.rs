@@ -2,10 +2,14 @@
 
 use glam::DVec3;
 
+use crate::Revision;
+
 /// The volume that bricks are cut from. Decimated pyramids only: the samples of level `l` lie at multiples
 /// of `2^l` finest cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeLayout {
+    /// Names the volume, and the way its bricks are stored.
+    pub revision: Revision,
     /// Finest cells along x, y, z: samples less one. Zero along an axis leaves nothing to integrate; a
     /// plane along it shows an image.
     pub cells: [u32; 3],

@@ -127,11 +127,12 @@ fn z_order(a: [u32; 3], b: [u32; 3]) -> std::cmp::Ordering {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BrickId, PlacedBrick, TexelType};
+    use crate::{BrickId, PlacedBrick, Revision, TexelType};
     use glam::DVec3;
 
     fn layout(cells: [u32; 3], brick_cells: u32) -> VolumeLayout {
         VolumeLayout {
+            revision: Revision::new(),
             cells,
             spacing: DVec3::ONE,
             brick_cells,

@@ -29,6 +29,7 @@ pub mod cubes;
 pub mod plane_tiles;
 pub mod planes;
 pub mod ray_transfer;
+mod revision;
 pub mod sheets;
 
 pub use backend::{Backend, Device, DeviceKind, DrawError, Drawn, Image, RayDoubt, UploadError};
@@ -38,6 +39,7 @@ pub use cubes::{Cube, Cubes, Thickness};
 pub use plane_tiles::{PlaneTile, PlaneTiles};
 pub use planes::{BlendedBrick, Planes, PointTransfer, Sampling};
 pub use ray_transfer::RayTransfer;
+pub use revision::Revision;
 pub use sheets::{Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets};
 
 use volery_scene::{Camera, TriangleMesh};

@@ -206,7 +206,7 @@ fn narrow(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Content, RayTransfer, Rays, TexelType};
+    use crate::{Content, RayTransfer, Rays, Revision, TexelType};
     use volery_scene::{Camera, ControlPoint, TransferFunction};
 
     /// What f32 makes of a tile at one of its pixels: the place from the volume's corner, and the depth.
@@ -223,6 +223,7 @@ mod tests {
 
     fn layout(cells: u32, spacing: DVec3) -> VolumeLayout {
         VolumeLayout {
+            revision: Revision::new(),
             cells: [cells; 3],
             spacing,
             brick_cells: 32,

@@ -3,8 +3,8 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use volery_frame::{
-    Backend, BlendedBrick, Brick, BrickId, Content, Frame, PlacedBrick, Planes, PointTransfer, Sampling,
-    TexelType, Texels, VolumeLayout,
+    Backend, BlendedBrick, Brick, BrickId, Content, Frame, PlacedBrick, Planes, PointTransfer, Revision,
+    Sampling, TexelType, Texels, VolumeLayout,
 };
 use volery_scene::{Camera, ControlPoint, Plane, Projection, TransferFunction};
 use volery_software::SoftwareBackend;
@@ -43,6 +43,7 @@ fn fill(backend: &mut SoftwareBackend, layout: &VolumeLayout) -> Vec<BlendedBric
 
 fn plane(criterion: &mut Criterion) {
     let layout = VolumeLayout {
+        revision: Revision::new(),
         cells: [SAMPLES - 1; 3],
         spacing: DVec3::ONE,
         brick_cells: BRICK_CELLS,

@@ -57,7 +57,7 @@ mod walk;
 use fearless_simd::Level;
 use volery_frame::backend::check_frame;
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, RayDoubt,
+    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, RayDoubt, Revision,
     UploadError, VolumeLayout,
 };
 
@@ -138,6 +138,10 @@ impl Backend for SoftwareBackend {
         }
         self.volume = Some((*layout, Pool::new(layout.texel)));
         Ok(())
+    }
+
+    fn volume(&self) -> Option<Revision> {
+        self.volume.as_ref().map(|(layout, _)| layout.revision)
     }
 
     fn is_resident(&self, id: BrickId) -> bool {

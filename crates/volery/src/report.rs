@@ -10,7 +10,7 @@ use volery_io::OpenedFile;
 use volery_io::scene_file::{SceneTransfer, serialize_camera, serialize_transfer};
 use volery_scene::Camera;
 
-use crate::session::View;
+use crate::view::{Transfer, View};
 
 pub use crate::ray_budget::RayBudget;
 
@@ -220,9 +220,9 @@ impl Backend {
 
 /// The transfer function of a view, as a scene has it.
 pub(crate) fn transfer_of(view: &View) -> SceneTransfer {
-    match &view.stack.classification {
-        Some(function) => SceneTransfer::Magnitudes(function.as_ref().clone()),
-        None => SceneTransfer::Values(view.transfer.clone()),
+    match &view.transfer {
+        Transfer::Magnitudes(function) => SceneTransfer::Magnitudes(function.as_ref().clone()),
+        Transfer::Values(transfer) => SceneTransfer::Values(transfer.clone()),
     }
 }
 

@@ -3,7 +3,7 @@
 use volery_frame::backend::check_frame;
 use volery_frame::{
     Backend, Brick, BrickId, Content, Cubes, Device, DeviceKind, DrawError, Drawn, Frame, Image, PlacedBrick,
-    Planes, RayTransfer, Rays, Sheets, UploadError, VolumeLayout,
+    Planes, RayTransfer, Rays, Revision, Sheets, UploadError, VolumeLayout,
 };
 use volery_shaders::raycast;
 
@@ -219,6 +219,10 @@ impl Backend for WgpuBackend {
         self.plane.forget();
         self.pool = Some(pool);
         Ok(())
+    }
+
+    fn volume(&self) -> Option<Revision> {
+        self.pool.as_ref().map(|pool| pool.layout().revision)
     }
 
     fn is_resident(&self, id: BrickId) -> bool {

@@ -12,12 +12,12 @@ use std::path::{Path, PathBuf};
 use volery::glam::DVec3;
 use volery::output::write_image;
 use volery::{
-    BackendChoice, ControlPoint, Image, Session, Technique, Thickness, TransferFunction, View, ViewOptions,
-    open_backend,
+    BackendChoice, ControlPoint, Dial, How, Image, Thickness, TransferFunction, View, ViewOptions,
+    VolumeData, open_backend,
 };
 use volery_reference::metrics::compare;
 use volery_software::SoftwareBackend;
-use volery_tests::{exact, read_scene, view_of};
+use volery_tests::{Drawer, exact, read_scene, view_of};
 
 const FRAMES: usize = 4;
 
@@ -47,7 +47,7 @@ struct Timed {
 }
 
 /// The last of some frames, with the times of the median of those after the first.
-fn draw(session: &mut Session, view: &View) -> Result<Timed, Box<dyn Error>> {
+fn draw(session: &mut Drawer<VolumeData>, view: &View) -> Result<Timed, Box<dyn Error>> {
     let mut frames = Vec::new();
     let mut last = session.render(view)?;
     for _ in 1..FRAMES {
@@ -68,10 +68,10 @@ fn draw(session: &mut Session, view: &View) -> Result<Timed, Box<dyn Error>> {
 
 /// The scene, by both techniques, and its truth.
 struct Engine {
-    fans: Session,
+    software: Drawer<VolumeData>,
     /// On the best device of wgpu.
-    gpu_fans: Session,
-    rays: Session,
+    gpu: Drawer<VolumeData>,
+    /// Of rays.
     view: View,
     truth: volery_reference::Image,
 }
@@ -80,15 +80,13 @@ impl Engine {
     fn open(data: &Path) -> Result<Self, Box<dyn Error>> {
         let input = read_scene(data, "engine");
         let view = view_of(&input);
-        let open = |technique, choice| -> Result<Session, Box<dyn Error>> {
-            Ok(Session::open(input.volume()?.grid.clone(), open_backend(choice)?, technique)?)
+        let open = |choice| -> Result<Drawer<VolumeData>, Box<dyn Error>> {
+            Ok(Drawer::volume(input.volume()?.grid.clone(), open_backend(choice)?, How::Raycast)?)
         };
-        let fans = open(Technique::Fans, BackendChoice::Software)?;
-        let gpu_fans = open(Technique::Fans, BackendChoice::Wgpu)?;
-        let mut rays = open(Technique::Raycast, BackendChoice::Software)?;
-        let mut picture = rays.render(&view)?;
-        let truth = rays.verify(&view, &mut picture, &|_| ())?;
-        Ok(Self { fans, gpu_fans, rays, view, truth })
+        let (mut software, gpu) = (open(BackendChoice::Software)?, open(BackendChoice::Wgpu)?);
+        let mut picture = software.render(&view)?;
+        let truth = software.verify(&view, &mut picture, &|_| ())?;
+        Ok(Self { software, gpu, view, truth })
     }
 
     fn errors(&self, timed: &Timed) -> Result<String, Box<dyn Error>> {
@@ -104,7 +102,7 @@ impl Engine {
              0.19 M and 15.8 K cubes of 256 x 256 x 110 samples by its own transfer function, and 37.5, 0.95 and \
              0.070 s.\n",
             rayon::current_num_threads(),
-            self.gpu_fans.render(&self.view)?.report.backend.device,
+            self.gpu.render(&self.view)?.report.backend.device,
         );
         println!(
             "| tolerance | thickness | cubes | triangles | per cube | selection s | rendering s | M cubes/s | rmse | \
@@ -114,8 +112,9 @@ impl Engine {
         for tolerance in FIGURE_9 {
             for (thickness, name) in [(Thickness::Exact, "exact"), (Thickness::Interpolated, "interpolated")]
             {
-                let view = View { tolerance: Some(tolerance), thickness, ..self.view.clone() };
-                let drawn = [draw(&mut self.fans, &view)?, draw(&mut self.gpu_fans, &view)?];
+                let view =
+                    View { dial: Dial::Tolerance(tolerance), how: How::Fans(thickness), ..self.view.clone() };
+                let drawn = [draw(&mut self.software, &view)?, draw(&mut self.gpu, &view)?];
                 for (device, timed) in ["software", "wgpu"].iter().zip(drawn) {
                     println!(
                         "| {} % | {name}, {device} | {} | {} | {:.2} | {:.4} | {:.4} | {:.1} | {} |",
@@ -138,7 +137,7 @@ impl Engine {
     /// All cubes of the paper's count, at full resolution.
     fn paper(&mut self) -> Result<(), Box<dyn Error>> {
         const CUBES: usize = 5_200_000;
-        let samples = self.fans.grid().samples();
+        let samples = self.software.data().grid().samples();
         let mut voxels_from = [0; 257];
         for place in 0..samples.len() {
             voxels_from[samples.value(place, 0) as usize] += 1;
@@ -164,8 +163,10 @@ impl Engine {
                     point(255.0, [1.0, 0.8, 0.4], opacity),
                 ],
                 1.0,
-            )?;
-            let timed = draw(&mut self.fans, &View { tolerance: None, ..self.view.clone() })?;
+            )?
+            .into();
+            let how = How::Fans(Thickness::Exact);
+            let timed = draw(&mut self.software, &View { how, ..self.view.clone() })?;
             println!(
                 "| {opacity} | {} | {:.4} | {:.4} | {:.1} |",
                 timed.nodes,
@@ -188,8 +189,10 @@ impl Engine {
              |---|---|---|---|---|---|---|---|---|"
         );
         for tolerance in CURVE {
-            let view = View { tolerance: Some(tolerance), ..self.view.clone() };
-            let [fans, rays] = [draw(&mut self.fans, &view)?, draw(&mut self.rays, &view)?];
+            let view = View { dial: Dial::Tolerance(tolerance), ..self.view.clone() };
+            let [fans, rays] = [&View { how: How::Fans(Thickness::Exact), ..view.clone() }, &view]
+                .map(|view| draw(&mut self.software, view));
+            let [fans, rays] = [fans?, rays?];
             println!(
                 "| {:.0} % | {} | {:.1} | {} | {} | {:.1} | {} |",
                 tolerance * 100.0,
@@ -209,12 +212,12 @@ impl Engine {
 fn head(folder: &Path) -> Result<(), Box<dyn Error>> {
     const SIDE: usize = 320;
     let grid = volery_data::head_u8([128, 160, 160], DVec3::ONE);
-    let mut session = Session::open(grid, Box::new(SoftwareBackend::new()), Technique::Fans)?;
+    let mut session = Drawer::volume(grid, Box::new(SoftwareBackend::new()), How::Fans(Thickness::Exact))?;
     let view =
         session.view(&ViewOptions { width: SIDE as u32, height: SIDE as u32, ..ViewOptions::default() });
     let mut pictures = Vec::new();
     for tolerance in FIGURE_9 {
-        pictures.push(session.render(&View { tolerance: Some(tolerance), ..view.clone() })?.image);
+        pictures.push(session.render(&View { dial: Dial::Tolerance(tolerance), ..view.clone() })?.image);
     }
     let rows =
         (0..SIDE).flat_map(|row| pictures.iter().map(move |picture| &picture.pixels[row * SIDE..][..SIDE]));

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::fs;
 use std::path::Path;
+use volery_tests::values_of;
 
 use serde_json::{Value, json};
 use volery::{Projection, SampleType, Samples, View};
@@ -19,7 +20,8 @@ pub(crate) fn save(scene: &Scene, name: &str, folder: &Path) -> Result<(), Box<d
 }
 
 fn scene_json(scene: &Scene, raw: &str) -> Value {
-    let View { width, height, camera, transfer, background, .. } = &scene.view;
+    let View { width, height, camera, background, .. } = &scene.view;
+    let transfer = values_of(&scene.view);
     let (projection, measure, number) = match camera.projection {
         Projection::Perspective { fov_y_deg } => ("perspective", "fov_y_deg", fov_y_deg),
         Projection::Orthographic { height } => ("orthographic", "height", height),

@@ -5,10 +5,10 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use volery::glam::DVec3;
-use volery::{Session, Technique, View, VoxelGrid};
+use volery::{How, View, VoxelGrid};
 use volery_reference::metrics::compare;
 use volery_reference::{Image, Tracer};
-use volery_tests::{Shared, exact, matter_view};
+use volery_tests::{Drawer, Shared, exact, matter_view, values_of};
 
 use crate::camera::{VIEWS, camera, size};
 use crate::random::Random;
@@ -58,7 +58,7 @@ impl Scene {
     /// The true picture; `None` where it takes longer than it may.
     pub(crate) fn truth(&self, most: Duration) -> Option<Image> {
         let View { width, height, background, .. } = self.view;
-        let tracer = Tracer::new(&self.grid, &self.view.transfer).expect("samples are numbers");
+        let tracer = Tracer::new(&self.grid, values_of(&self.view)).expect("samples are numbers");
         let tracer = tracer.with_tolerance(TRUTH_TOLERANCE);
         let rays = self.view.camera.rays(width, height);
         let end = Instant::now() + most;
@@ -81,7 +81,7 @@ impl Scene {
 
     fn drawn(&self, backend: &Shared, truth: &Image) -> Result<Measured, String> {
         let start = Instant::now();
-        let mut session = Session::open(self.grid.clone(), Box::new(backend.clone()), Technique::Raycast)
+        let mut session = Drawer::volume(self.grid.clone(), Box::new(backend.clone()), How::Raycast)
             .map_err(|error| error.to_string())?;
         let picture = session.render(&self.view).map_err(|error| error.to_string())?;
         let seconds = start.elapsed().as_secs_f64();

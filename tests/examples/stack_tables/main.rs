@@ -11,10 +11,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use volery::output::write_image;
-use volery::{GridSession, Image, Input, InputData, Picture, StackView, View};
+use volery::{GridData, How, Image, Input, InputData, Picture, StackView, View};
 use volery_reference::metrics::{Comparison, compare};
 use volery_software::SoftwareBackend;
-use volery_tests::{exact, read_scene, view_of};
+use volery_tests::{Drawer, exact, read_scene, view_of};
 
 const SCENES: [&str; 2] = ["bluntfin", "k3d_fem"];
 const COUNTS: [usize; 6] = [32, 64, 128, 256, 512, 1024];
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 struct Scene {
     name: &'static str,
     input: Input,
-    session: GridSession,
+    session: Drawer<GridData>,
     view: View,
     truth: volery_reference::Image,
 }
@@ -49,7 +49,7 @@ impl Scene {
         let InputData::Grid(file) = &input.data else { return Err(format!("{name} is no grid").into()) };
         let array = file.array.as_ref().map(|array| array.name.as_str());
         let backend = Box::new(SoftwareBackend::new());
-        let mut session = GridSession::open(file.grid.clone(), array, backend)?;
+        let mut session = Drawer::grid(file.grid.clone(), array, backend)?;
         let view = view_of(&input);
         let mut picture = session.render(&view)?;
         let truth = session.verify(&view, &mut picture, &|_| ())?;
@@ -58,8 +58,8 @@ impl Scene {
 
     /// The view, sliced another way.
     fn sliced(&self, num_slices: usize, adaptive: Option<f64>) -> View {
-        let stack = StackView { num_slices, adaptive, ..self.view.stack.clone() };
-        View { stack, ..self.view.clone() }
+        let how = How::Stack(StackView { num_slices, adaptive, ..StackView::default() });
+        View { how, ..self.view.clone() }
     }
 
     fn distance(&self, image: &Image) -> Result<Comparison, Box<dyn Error>> {

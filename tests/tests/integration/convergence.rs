@@ -2,13 +2,10 @@
 //! promises. It finds what golden pictures hide.
 
 use glam::DVec3;
-use volery::{
-    BackendChoice, Camera, ControlPoint, PlaneView, Session, StackView, Technique, Thickness,
-    TransferFunction, View,
-};
+use volery::{BackendChoice, Camera, ControlPoint, How, TransferFunction, View};
 use volery_reference::Image;
 use volery_scene::VoxelGrid;
-use volery_tests::{SMOOTH_EXTENT, backend, distance, draw, exact, smooth};
+use volery_tests::{Drawer, SMOOTH_EXTENT, backend, distance, draw, exact, matter_view, smooth, values_of};
 
 /// Colour and opacity change with the value, without a kink inside the field's range.
 fn view() -> View {
@@ -16,22 +13,12 @@ fn view() -> View {
         ControlPoint { value: 0.0, color: [0.1, 0.3, 0.9], opacity: 0.0 },
         ControlPoint { value: 1.0, color: [1.0, 0.6, 0.1], opacity: 0.6 },
     ];
-    View {
-        width: 48,
-        height: 48,
-        camera: Camera::fitted(DVec3::splat(SMOOTH_EXTENT), 30.0, 20.0, 1.0, false),
-        transfer: TransferFunction::new(points, 1.0).unwrap(),
-        background: [0.0; 3],
-        tolerance: None,
-        planes: PlaneView::default(),
-        thickness: Thickness::default(),
-        stack: StackView::default(),
-        meshes: [].into(),
-    }
+    let camera = Camera::fitted(DVec3::splat(SMOOTH_EXTENT), 30.0, 20.0, 1.0, false);
+    matter_view(camera, TransferFunction::new(points, 1.0).unwrap(), [0.0; 3], [48, 48])
 }
 
 fn truth(grid: &VoxelGrid, view: &View) -> Image {
-    volery_reference::render(grid, &view.camera, &view.transfer, view.background, view.width, view.height)
+    volery_reference::render(grid, &view.camera, values_of(view), view.background, view.width, view.height)
         .unwrap()
 }
 
@@ -60,14 +47,14 @@ by_both_backends! { a_backend_converges_to_the_reference_at_second_order }
 fn a_backend_converges_to_the_reference_at_second_order(choice: BackendChoice, test: &str) {
     // On the same samples, what is left is the integration over parts of cells. Matter is thin here: where straight
     // pieces could be off by much, backends cut finer or integrate exactly, and there is no order to be seen.
-    let thin = TransferFunction::new(view().transfer.points().to_vec(), 10.0).unwrap();
-    let view = View { transfer: thin, ..view() };
+    let thin = TransferFunction::new(values_of(&view()).points().to_vec(), 10.0).unwrap();
+    let view = View { transfer: thin.into(), ..view() };
     let mut errors = Vec::new();
     for cells in [8, 16, 32] {
         let grid = smooth(cells);
         let Some(backend) = backend(choice, test) else { return };
         let drawn =
-            exact(&draw(&mut Session::open(grid.clone(), backend, Technique::Raycast).unwrap(), &view).image);
+            exact(&draw(&mut Drawer::volume(grid.clone(), backend, How::Raycast).unwrap(), &view).image);
         errors.push(distance(&format!("{choice:?}, {cells} cells"), &drawn, &truth(&grid, &view)).rmse);
     }
     let found = orders(&errors);

@@ -5,16 +5,17 @@ use std::sync::{Arc, Mutex};
 use glam::DVec3;
 use rayon::ThreadPoolBuilder;
 use volery::{
-    BackendChoice, Camera, ControlPoint, Projection, Session, Technique, Thickness, TransferFunction, View,
-    ViewOptions,
+    BackendChoice, Camera, ControlPoint, Dial, How, Projection, Thickness, TransferFunction, View,
+    ViewOptions, VolumeData,
 };
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Cube, Device, DrawError, Drawn, Frame, UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Cube, Device, DrawError, Drawn, Frame, Revision, UploadError,
+    VolumeLayout,
 };
 use volery_reference::Image;
 use volery_scene::{Ray, VoxelGrid};
 use volery_software::SoftwareBackend;
-use volery_tests::{at_most, backend, data_folder, distance, draw, exact, read_scene, view_of};
+use volery_tests::{Drawer, at_most, backend, data_folder, distance, draw, exact, read_scene, view_of};
 
 /// Keeps the cubes of the last frame.
 struct Keeping {
@@ -29,6 +30,10 @@ impl Backend for Keeping {
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
         self.backend.set_volume(layout)
+    }
+
+    fn volume(&self) -> Option<Revision> {
+        self.backend.volume()
     }
 
     fn is_resident(&self, id: BrickId) -> bool {
@@ -51,13 +56,13 @@ impl Backend for Keeping {
 }
 
 /// A session whose cubes can be seen.
-fn open(grid: VoxelGrid, backend: Box<dyn Backend>) -> (Session, Arc<Mutex<Vec<Cube>>>) {
+fn open(grid: VoxelGrid, backend: Box<dyn Backend>) -> (Drawer<VolumeData>, Arc<Mutex<Vec<Cube>>>) {
     let kept = Arc::default();
     let backend = Box::new(Keeping { backend, kept: Arc::clone(&kept) });
-    (Session::open(grid, backend, Technique::Fans).unwrap(), kept)
+    (Drawer::volume(grid, backend, How::Fans(Thickness::Exact)).unwrap(), kept)
 }
 
-fn software(grid: VoxelGrid) -> (Session, Arc<Mutex<Vec<Cube>>>) {
+fn software(grid: VoxelGrid) -> (Drawer<VolumeData>, Arc<Mutex<Vec<Cube>>>) {
     open(grid, Box::new(SoftwareBackend::new()))
 }
 
@@ -147,14 +152,14 @@ fn max_difference(choice: BackendChoice) -> f64 {
 }
 
 fn is_the_integral(
-    (session, kept): (&mut Session, &Mutex<Vec<Cube>>),
+    (session, kept): (&mut Drawer<VolumeData>, &Mutex<Vec<Cube>>),
     view: &View,
     choice: BackendChoice,
     what: &str,
 ) {
     let picture = draw(session, view);
     let cubes = std::mem::take(&mut *kept.lock().unwrap());
-    let expected = Steps::new(session.grid(), &cubes).picture(view);
+    let expected = Steps::new(session.data().grid(), &cubes).picture(view);
     let found = distance(&format!("{what}, {} cubes", cubes.len()), &exact(&picture.image), &expected);
     at_most("rmse", found.rmse, MAX_RMSE);
     at_most("largest difference", found.max, max_difference(choice));
@@ -170,7 +175,7 @@ fn engine_is_the_integral_of_its_cubes(choice: BackendChoice, test: &str) {
     let Some(data) = data_folder(test) else { return };
     let Some(backend) = backend(choice, test) else { return };
     let input = read_scene(&data, "engine");
-    let scene = View { width: 192, height: 160, ..view_of(&input) };
+    let scene = View { width: 192, height: 160, how: How::Fans(Thickness::Exact), ..view_of(&input) };
     let (mut session, kept) = open(input.volume().unwrap().grid.clone(), backend);
     let (middle, inside) = (scene.camera.target, DVec3::new(101.3, 88.1, 40.7));
     for (place, camera) in [
@@ -180,7 +185,7 @@ fn engine_is_the_integral_of_its_cubes(choice: BackendChoice, test: &str) {
         ("inside, 90 degrees", perspective(inside, middle + DVec3::new(90.0, 30.0, 0.0), 90.0)),
     ] {
         for tolerance in [0.0, 0.18] {
-            let view = View { camera, tolerance: Some(tolerance), ..scene.clone() };
+            let view = View { camera, dial: Dial::Tolerance(tolerance), ..scene.clone() };
             is_the_integral(
                 (&mut session, &kept),
                 &view,
@@ -204,14 +209,14 @@ fn volumes() -> Vec<(&'static str, VoxelGrid)> {
 }
 
 /// Red is the value's place in the range; opacity does not depend on it.
-fn reddening(session: &Session) -> TransferFunction {
+fn reddening(session: &Drawer<VolumeData>) -> TransferFunction {
     let [low, high] = session.value_range();
     let point = |value, red| ControlPoint { value, color: [red, 0.5, 1.0 - red], opacity: 0.1 };
     TransferFunction::new(vec![point(low, 0.0), point(high.max(low + 1.0), 1.0)], 1.0).unwrap()
 }
 
-fn whole_view(session: &Session) -> View {
-    let transfer = Some(reddening(session));
+fn whole_view(session: &Drawer<VolumeData>) -> View {
+    let transfer = Some(reddening(session).into());
     session.view(&ViewOptions { width: 64, height: 56, transfer, ..ViewOptions::default() })
 }
 
@@ -221,7 +226,7 @@ fn generated_volumes_are_the_integrals_of_their_cubes(choice: BackendChoice, tes
         let (mut session, kept) = open(grid, backend);
         let view = View { width: 120, height: 90, ..whole_view(&session) };
         for tolerance in [0.0, 0.2, 2.0] {
-            let view = View { tolerance: Some(tolerance), ..view.clone() };
+            let view = View { dial: Dial::Tolerance(tolerance), ..view.clone() };
             is_the_integral((&mut session, &kept), &view, choice, &format!("{name}, tolerance {tolerance}"));
         }
     }
@@ -235,7 +240,8 @@ fn cubes_are_within_the_tolerance_and_cover_every_voxel_once() {
         let [low, high] = session.value_range();
         let range = (high - low).max(1.0);
         for tolerance in [0.0, 0.05, 0.3, 0.7] {
-            let report = draw(&mut session, &View { tolerance: Some(tolerance), ..view.clone() }).report;
+            let report =
+                draw(&mut session, &View { dial: Dial::Tolerance(tolerance), ..view.clone() }).report;
             let cubes = std::mem::take(&mut *kept.lock().unwrap());
             assert_eq!(report.work.nodes.unwrap(), cubes.len(), "{name}");
             assert!(tolerance > 0.0 || cubes.iter().all(|cube| cube.level == 0), "{name}: voxels alone");
@@ -265,8 +271,8 @@ fn cubes_are_within_the_tolerance_and_cover_every_voxel_once() {
 #[test]
 fn no_cube_is_hidden_by_an_earlier_one() {
     let (mut session, kept) = software(volery_data::holes([11, 9, 7], 4, 0.1));
-    let view = View { tolerance: Some(0.25), ..whole_view(&session) };
-    let layout = layout(session.grid());
+    let view = View { dial: Dial::Tolerance(0.25), ..whole_view(&session) };
+    let layout = layout(session.data().grid());
     let eyes = [
         DVec3::new(-20.0, 14.0, 30.0),
         DVec3::new(4.2, -9.0, 3.1),
@@ -303,6 +309,7 @@ fn no_cube_is_hidden_by_an_earlier_one() {
 
 fn layout(grid: &VoxelGrid) -> VolumeLayout {
     VolumeLayout {
+        revision: Revision::new(),
         cells: grid.dims().map(|n| n as u32 - 1),
         spacing: grid.spacing(),
         brick_cells: 1,
@@ -332,7 +339,7 @@ fn transparent_cubes_are_skipped() {
     let points = [(low, 0.0), (middle, 0.0), (middle, 0.4), (high, 0.4)];
     let points = points.map(|(value, opacity)| ControlPoint { value, color: [1.0; 3], opacity });
     let transfer = TransferFunction::new(points.to_vec(), 1.0).unwrap();
-    let view = View { transfer, ..whole_view(&session) };
+    let view = View { transfer: transfer.into(), ..whole_view(&session) };
     draw(&mut session, &view);
     let num_visible =
         (0..grid.num_samples()).filter(|&place| grid.samples().value(place, 0) > middle).count();
@@ -351,9 +358,9 @@ fn the_number_of_threads_changes_neither_cubes_nor_pixels() {
         let pool = ThreadPoolBuilder::new().num_threads(num_threads).build().unwrap();
         let found = pool.install(|| {
             let (mut session, kept) = software(volery_data::noise([67, 37, 41], 5));
-            let view = View { tolerance: Some(0.3), ..whole_view(&session) };
+            let view = View { dial: Dial::Tolerance(0.3), ..whole_view(&session) };
             let mut bits = |thickness| {
-                let image = draw(&mut session, &View { thickness, ..view.clone() }).image;
+                let image = draw(&mut session, &View { how: How::Fans(thickness), ..view.clone() }).image;
                 image.pixels.iter().map(|pixel| pixel.map(f32::to_bits)).collect::<Bits>()
             };
             let pictures = [bits(Thickness::Exact), bits(Thickness::Interpolated)];
@@ -369,7 +376,7 @@ fn the_number_of_threads_changes_neither_cubes_nor_pixels() {
 #[test]
 fn triangles_are_those_of_the_fans() {
     let (mut session, kept) = software(volery_data::noise([13, 11, 9], 6));
-    let layout = layout(session.grid());
+    let layout = layout(session.data().grid());
     for (eye, orthographic) in [
         (DVec3::new(-20.0, 14.0, 30.0), false),
         (DVec3::new(5.0, 4.0, 40.0), false),

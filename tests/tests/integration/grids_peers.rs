@@ -5,10 +5,12 @@
 
 use std::sync::OnceLock;
 
-use volery::{BackendChoice, GridSession, Input, InputData, StackView, View};
+use volery::{BackendChoice, GridData, Input, InputData};
 use volery_io::read_png_rgb;
 use volery_reference::Image;
-use volery_tests::{at_most, backend, data_folder, distance, exact, read_scene, scenes_folder, view_of};
+use volery_tests::{
+    Drawer, at_most, backend, data_folder, distance, exact, read_scene, scenes_folder, view_of, with_stack,
+};
 
 const MAX_RMSE_TO_VTK: f64 = 0.002;
 const MAX_RMSE_TO_REFERENCE: f64 = 0.002;
@@ -28,10 +30,10 @@ struct Scene {
     wgpu: OnceLock<Pictures>,
 }
 
-fn open(input: &Input, choice: BackendChoice, test: &str) -> Option<GridSession> {
+fn open(input: &Input, choice: BackendChoice, test: &str) -> Option<Drawer<GridData>> {
     let InputData::Grid(file) = &input.data else { panic!("{test}: is no grid") };
     let array = file.array.as_ref().map(|array| array.name.as_str());
-    Some(GridSession::open(file.grid.clone(), array, backend(choice, test)?).unwrap())
+    Some(Drawer::grid(file.grid.clone(), array, backend(choice, test)?).unwrap())
 }
 
 impl Scene {
@@ -49,7 +51,7 @@ impl Scene {
             let input = read_scene(&data, self.name);
             let mut session = open(&input, choice, test).expect("asked before");
             let view = view_of(&input);
-            let fine = View { stack: StackView { num_slices: FINE, ..view.stack.clone() }, ..view.clone() };
+            let fine = with_stack(&view, |stack| stack.num_slices = FINE);
             [view, fine].map(|view| exact(&session.render(&view).unwrap().image))
         }))
     }

@@ -34,5 +34,6 @@ mod peers;
 mod planes;
 mod rays;
 mod sections;
+mod sessions;
 mod stack_files;
 mod trees;

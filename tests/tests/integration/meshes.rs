@@ -5,10 +5,9 @@ use std::path::Path;
 
 use glam::DVec3;
 use volery::{
-    BackendChoice, GridSession, Input, InputData, Picture, Plane, PlaneView, Session, Technique, View,
-    read_input,
+    BackendChoice, How, Input, InputData, Picture, Plane, PlaneView, Thickness, View, VolumeData, read_input,
 };
-use volery_tests::{SMOOTH_EXTENT, at_most, backend, distance, draw, exact, smooth, view_of};
+use volery_tests::{Drawer, SMOOTH_EXTENT, at_most, backend, distance, draw, exact, smooth, view_of};
 
 const SCENE: &str = r#"{"input": {"kind": "KIND", "file": "FILE"}, "size": [160, 120], "background": [0.1, 0.15, 0.2],
     "camera": {"projection": "perspective", "eye": [17, -11, 9], "target": [4, 4, 4], "up": [0, 0, 1], "fov_y_deg": 40},
@@ -122,7 +121,7 @@ fn check(what: &str, picture: &Picture, truth: &volery_reference::Image, without
     assert!(num_changed > 1000, "{what}: {num_changed}");
 }
 
-fn check_session(session: &mut Session, view: &View, what: &str, max_rmse: f64) {
+fn check_session(session: &mut Drawer<VolumeData>, view: &View, what: &str, max_rmse: f64) {
     let mut picture = draw(session, view);
     let without = draw(session, &View { meshes: [].into(), ..view.clone() });
     let truth = session.verify(view, &mut picture, &|_| {}).unwrap_or_else(|error| panic!("{error}"));
@@ -140,8 +139,7 @@ fn meshes_among_rays(choice: BackendChoice, test: &str) {
     let Some(backend) = backend(choice, test) else { return };
     let (_folder, input) = read_volume_scene(&smooth(32));
     let view = view_of(&input);
-    let mut session =
-        Session::open(input.volume().unwrap().grid.clone(), backend, Technique::Raycast).unwrap();
+    let mut session = Drawer::volume(input.volume().unwrap().grid.clone(), backend, How::Raycast).unwrap();
     check_session(&mut session, &view, test, max_rmse(choice, 2e-5));
 }
 
@@ -154,8 +152,10 @@ fn meshes_among_planes(choice: BackendChoice, test: &str) {
         Plane { normal: DVec3::Z, distance: 5.2 },
     ];
     let planes = PlaneView { planes, is_transparent: true, ..PlaneView::default() };
-    let view = View { planes, ..view_of(&input) };
-    let mut session = Session::open(input.volume().unwrap().grid.clone(), backend, Technique::Plane).unwrap();
+    let view = View { how: How::Planes(planes), ..view_of(&input) };
+    let mut session =
+        Drawer::volume(input.volume().unwrap().grid.clone(), backend, How::Planes(PlaneView::default()))
+            .unwrap();
     check_session(&mut session, &view, test, max_rmse(choice, 1e-6));
 }
 
@@ -163,8 +163,8 @@ fn meshes_among_planes(choice: BackendChoice, test: &str) {
 fn meshes_among_cubes(choice: BackendChoice, test: &str) {
     let Some(backend) = backend(choice, test) else { return };
     let (_folder, input) = read_volume_scene(&volery_data::uniform([17; 3], DVec3::splat(0.5), 0.6));
-    let view = view_of(&input);
-    let mut session = Session::open(input.volume().unwrap().grid.clone(), backend, Technique::Fans).unwrap();
+    let view = View { how: How::Fans(Thickness::Exact), ..view_of(&input) };
+    let mut session = Drawer::volume(input.volume().unwrap().grid.clone(), backend, How::Raycast).unwrap();
     check_session(&mut session, &view, test, max_rmse(choice, 1e-6));
 }
 
@@ -175,7 +175,7 @@ fn meshes_among_sheets(choice: BackendChoice, test: &str) {
     let input = read(folder.path(), "grid", "grid.vtk");
     let view = view_of(&input);
     let InputData::Grid(file) = &input.data else { panic!("a grid was read") };
-    let mut session = GridSession::open(file.grid.clone(), None, backend).unwrap();
+    let mut session = Drawer::grid(file.grid.clone(), None, backend).unwrap();
     let mut draw = |view: &View| session.render(view).unwrap_or_else(|error| panic!("{error}"));
     let (mut picture, without) = (draw(&view), draw(&View { meshes: [].into(), ..view.clone() }));
     let truth = session.verify(&view, &mut picture, &|_| {}).unwrap_or_else(|error| panic!("{error}"));

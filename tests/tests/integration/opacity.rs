@@ -4,10 +4,10 @@
 //! the distance of samples, the number of bricks and the level of the cut are swept with the same matter.
 
 use glam::DVec3;
-use volery::{BackendChoice, ControlPoint, Session, Technique, TransferFunction, View, ViewOptions};
+use volery::{BackendChoice, ControlPoint, Dial, How, TransferFunction, View, ViewOptions, VolumeData};
 use volery_reference::Image;
 use volery_scene::VoxelGrid;
-use volery_tests::{at_most, backend, distance, draw, exact};
+use volery_tests::{Drawer, at_most, backend, distance, draw, exact, values_of};
 
 by_both_backends! {
     extremes_of_extinction_are_exact
@@ -35,15 +35,16 @@ fn prepared(
     transfer: TransferFunction,
     choice: BackendChoice,
     test: &str,
-) -> Option<(Session, View)> {
-    let session = Session::open(grid, backend(choice, test)?, Technique::Raycast).unwrap();
-    let options = ViewOptions { width: 64, height: 64, transfer: Some(transfer), ..ViewOptions::default() };
+) -> Option<(Drawer<VolumeData>, View)> {
+    let session = Drawer::volume(grid, backend(choice, test)?, How::Raycast).unwrap();
+    let options =
+        ViewOptions { width: 64, height: 64, transfer: Some(transfer.into()), ..ViewOptions::default() };
     let view = View { background: [0.0; 3], ..session.view(&options) };
     Some((session, view))
 }
 
 fn truth(grid: &VoxelGrid, view: &View) -> Image {
-    volery_reference::render(grid, &view.camera, &view.transfer, view.background, view.width, view.height)
+    volery_reference::render(grid, &view.camera, values_of(view), view.background, view.width, view.height)
         .unwrap()
 }
 
@@ -71,7 +72,7 @@ fn opacity_one_hides_everything_behind_a_sixteenth_of_a_cell(choice: BackendChoi
     let Some((mut session, view)) = prepared(grid.clone(), white(1.0), choice, test) else { return };
     let drawn = exact(&draw(&mut session, &view).image);
     // The exact picture of half opaque matter tells how much of it a ray meets: 1 - .5^length.
-    let half = truth(&grid, &View { transfer: white(0.5), ..view.clone() });
+    let half = truth(&grid, &View { transfer: white(0.5).into(), ..view.clone() });
     let (mut dark, mut bright) = (0, 0);
     for (drawn, half) in drawn.pixels().iter().zip(half.pixels()) {
         let length = -f64::log2(1.0 - half[0]);
@@ -114,7 +115,7 @@ fn the_level_of_the_cut_does_not_change_opacity(choice: BackendChoice, test: &st
     let grid = volery_data::ramp([129, 129, 129], DVec3::splat(0.125), DVec3::splat(1.0 / 48.0), 0.0);
     let Some((mut session, view)) = prepared(grid.clone(), ramp(), choice, test) else { return };
     let fine = draw(&mut session, &view);
-    let coarse = draw(&mut session, &View { tolerance: Some(1e-3), ..view.clone() });
+    let coarse = draw(&mut session, &View { dial: Dial::Tolerance(1e-3), ..view.clone() });
     assert_eq!(coarse.report.work.nodes.unwrap(), 1, "a ramp needs the root alone");
     assert!(fine.report.work.nodes.unwrap() > 1, "{} nodes", fine.report.work.nodes.unwrap());
     let found = distance(&format!("{choice:?}, root to finest"), &exact(&coarse.image), &exact(&fine.image));
@@ -130,7 +131,7 @@ fn a_finer_unit_distance_is_the_same_matter(choice: BackendChoice, test: &str) {
         let opacity = -f64::exp_m1(factor * f64::ln_1p(-0.02));
         let point = ControlPoint { value: 0.0, color: [1.0; 3], opacity };
         let transfer = TransferFunction::new(vec![point], factor).unwrap();
-        let drawn = exact(&draw(&mut session, &View { transfer, ..view.clone() }).image);
+        let drawn = exact(&draw(&mut session, &View { transfer: transfer.into(), ..view.clone() }).image);
         at_most(&format!("{choice:?}, unit x{factor}"), distance("units", &drawn, &expected).max, 1e-6);
     }
 }

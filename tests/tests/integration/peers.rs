@@ -5,11 +5,12 @@
 
 use std::sync::OnceLock;
 
-use volery::{BackendChoice, Session, Technique};
+use volery::{BackendChoice, How};
 use volery_io::read_png_rgb;
 use volery_reference::{Image, Tracer};
 use volery_tests::{
-    at_most, backend, data_folder, distance, draw, exact, read_scene, scenes_folder, view_of,
+    Drawer, at_most, backend, data_folder, distance, draw, exact, read_scene, scenes_folder, values_of,
+    view_of,
 };
 
 const MAX_RMSE_TO_VTK: f64 = 0.005;
@@ -36,7 +37,7 @@ impl Scene {
         Some(self.reference.get_or_init(|| {
             let input = read_scene(&data, self.name);
             let view = view_of(&input);
-            let tracer = Tracer::new(&input.volume().unwrap().grid, &view.transfer).unwrap();
+            let tracer = Tracer::new(&input.volume().unwrap().grid, values_of(&view)).unwrap();
             tracer.render(&view.camera, view.background, view.width, view.height, &|_| ()).unwrap()
         }))
     }
@@ -46,12 +47,9 @@ impl Scene {
         let data = data_folder(test)?;
         let make = || {
             let input = read_scene(&data, self.name);
-            let mut session = Session::open(
-                input.volume().unwrap().grid.clone(),
-                backend(choice, test)?,
-                Technique::Raycast,
-            )
-            .unwrap();
+            let mut session =
+                Drawer::volume(input.volume().unwrap().grid.clone(), backend(choice, test)?, How::Raycast)
+                    .unwrap();
             Some(exact(&draw(&mut session, &view_of(&input)).image))
         };
         if choice == BackendChoice::Software {

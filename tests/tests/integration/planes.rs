@@ -6,9 +6,10 @@ mod images;
 mod truth;
 
 use std::path::Path;
+use volery_tests::Drawer;
 
 use volery::glam::DVec3;
-use volery::{ControlPoint, Plane, Session, Technique, TransferFunction, VoxelGrid};
+use volery::{ControlPoint, How, Plane, PlaneView, TransferFunction, VolumeData, VoxelGrid};
 use volery_software::SoftwareBackend;
 
 const ENGINE: &str = "engine_256x256x128_uint8.raw";
@@ -21,8 +22,8 @@ fn read(data: &Path, name: &str) -> VoxelGrid {
     input.volume().unwrap().grid.clone()
 }
 
-fn software(grid: VoxelGrid) -> Session {
-    Session::open(grid, Box::new(SoftwareBackend::new()), Technique::Plane).unwrap()
+fn software(grid: VoxelGrid) -> Drawer<VolumeData> {
+    Drawer::volume(grid, Box::new(SoftwareBackend::new()), How::Planes(PlaneView::default())).unwrap()
 }
 
 /// A colour that never is the background's, steep in parts, in the middle half of `range` half transparent.

@@ -5,9 +5,9 @@ use std::process::Command;
 
 use glam::DVec3;
 use volery::io::{GlbOptions, GridOptions, read_grid, read_stack};
-use volery::{BackendChoice, GridSession, InputData, Slices, StackSession, open_backend};
+use volery::{BackendChoice, InputData, Slices, open_backend};
 use volery_slicing::QuantizedMesh;
-use volery_tests::{at_most, data_folder, distance, exact, read_scene, view_of};
+use volery_tests::{Drawer, at_most, data_folder, distance, exact, read_scene, stack_of, view_of};
 
 const NAMES: [&str; 3] = ["bluntfin", "k3d_fem", "post_mixed"];
 const NORMAL: DVec3 = DVec3::new(0.3, 0.5, 0.81);
@@ -15,8 +15,8 @@ const MAX_BYTES: u64 = 1 << 30;
 
 fn slices(data: &Path, name: &str) -> Slices {
     let file = read_grid(&data.join(format!("{name}.vtu")), &GridOptions::default()).unwrap();
-    let session = GridSession::open(file.grid, None, open_backend(BackendChoice::Software).unwrap()).unwrap();
-    session.slices(NORMAL, 256).unwrap()
+    let session = Drawer::grid(file.grid, None, open_backend(BackendChoice::Software).unwrap()).unwrap();
+    session.data().slices(NORMAL, 256).unwrap()
 }
 
 /// With every triangle from its least corner on.
@@ -57,15 +57,15 @@ fn a_file_changes_the_picture_little() {
         let input = read_scene(&data, name);
         let InputData::Grid(file) = &input.data else { panic!("{name} is no grid") };
         let array = file.array.as_ref().map(|array| array.name.as_str());
-        let mut session = GridSession::open(file.grid.clone(), array, software()).unwrap();
+        let mut session = Drawer::grid(file.grid.clone(), array, software()).unwrap();
         let mut view = view_of(&input);
-        view.stack.num_slices = 256;
+        stack_of(&mut view).num_slices = 256;
         let sliced = session.render(&view).unwrap().image;
 
         let [_, _, forward] = view.camera.axes();
         let path = folder.path().join("a.vsl");
-        session.slices(forward, view.stack.num_slices).unwrap().write_vsl(&path).unwrap();
-        let mut stack = StackSession::open(read_stack(&path, MAX_BYTES).unwrap(), software()).unwrap();
+        session.data().slices(forward, 256).unwrap().write_vsl(&path).unwrap();
+        let mut stack = Drawer::stack(read_stack(&path, MAX_BYTES).unwrap(), software()).unwrap();
         let from_file = stack.render_frames(&view, 1).unwrap().image;
         let what = format!("{name}: from a file against as sliced");
         let found = distance(&what, &exact(&sliced), &exact(&from_file));

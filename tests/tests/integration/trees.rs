@@ -2,12 +2,14 @@
 
 use glam::DVec3;
 use rayon::ThreadPoolBuilder;
-use volery::{BackendChoice, Image, Preset, Session, Technique, View, ViewOptions};
+use volery::{BackendChoice, Dial, How, Image, Preset, View, ViewOptions, VolumeData};
 use volery_octree::{DataTolerance, select, validate};
 use volery_pyramid::{Brick, Kind, Layout, Node, NodeSource, Pyramid};
 use volery_scene::VoxelGrid;
 use volery_software::SoftwareBackend;
-use volery_tests::{at_most, backend, data_folder, distance, draw, exact, read_scene, smooth, view_of};
+use volery_tests::{
+    Drawer, at_most, backend, data_folder, distance, draw, exact, read_scene, smooth, view_of,
+};
 
 /// Volumes that break trees: odd, prime, thin, anisotropic, constant, without structure, with holes.
 fn hard_volumes() -> Vec<(&'static str, VoxelGrid)> {
@@ -23,13 +25,13 @@ fn hard_volumes() -> Vec<(&'static str, VoxelGrid)> {
     ]
 }
 
-fn software(grid: VoxelGrid) -> Session {
-    Session::open(grid, Box::new(SoftwareBackend::new()), Technique::Raycast).unwrap()
+fn software(grid: VoxelGrid) -> Drawer<VolumeData> {
+    Drawer::volume(grid, Box::new(SoftwareBackend::new()), How::Raycast).unwrap()
 }
 
 /// All values visible, from aslant.
-fn whole_view(session: &Session) -> View {
-    let transfer = Some(session.preset(Preset::Ramp));
+fn whole_view(session: &Drawer<VolumeData>) -> View {
+    let transfer = Some(session.preset(Preset::Ramp).into());
     session.view(&ViewOptions { width: 96, height: 80, transfer, ..ViewOptions::default() })
 }
 
@@ -42,9 +44,9 @@ by_both_backends! { tolerance_zero_is_the_full_resolution_bit_for_bit }
 fn tolerance_zero_is_the_full_resolution_bit_for_bit(choice: BackendChoice, test: &str) {
     for (name, grid) in hard_volumes() {
         let Some(backend) = backend(choice, test) else { return };
-        let mut session = Session::open(grid, backend, Technique::Raycast).unwrap();
+        let mut session = Drawer::volume(grid, backend, How::Raycast).unwrap();
         let full = whole_view(&session);
-        let zero = View { tolerance: Some(0.0), ..full.clone() };
+        let zero = View { dial: Dial::Tolerance(0.0), ..full.clone() };
         let (full, zero) = (draw(&mut session, &full), draw(&mut session, &zero));
         assert_eq!(
             full.report.work.nodes_by_level.as_ref().unwrap(),
@@ -65,7 +67,7 @@ fn error_falls_with_the_tolerance() {
     let full = exact(&draw(&mut session, &view).image);
     let mut coarser: Option<(f64, usize)> = None;
     for tolerance in [0.01, 0.003, 0.0] {
-        let picture = draw(&mut session, &View { tolerance: Some(tolerance), ..view.clone() });
+        let picture = draw(&mut session, &View { dial: Dial::Tolerance(tolerance), ..view.clone() });
         let by_level = picture.report.work.nodes_by_level.as_ref().unwrap();
         let what = format!("tolerance {tolerance}, nodes by level {by_level:?}");
         let found = distance(&what, &exact(&picture.image), &full).rmse;
@@ -154,8 +156,8 @@ fn the_number_of_threads_does_not_change_a_bit() {
             let pictures = grids.iter().flat_map(|(_, grid)| {
                 let mut session = software(grid.clone());
                 let view = whole_view(&session);
-                [None, Some(0.02)]
-                    .map(|tolerance| bits(&draw(&mut session, &View { tolerance, ..view.clone() }).image))
+                [Dial::Full, Dial::Tolerance(0.02)]
+                    .map(|dial| bits(&draw(&mut session, &View { dial, ..view.clone() }).image))
             });
             pictures.collect::<Vec<_>>()
         })
@@ -185,7 +187,7 @@ fn the_number_of_threads_does_not_change_a_bit_of_real_data() {
 fn a_volume_of_one_sample_along_an_axis_is_refused_in_one_line() {
     for dims in [[1, 1, 1], [1, 1, 9], [5, 1, 7]] {
         let opened =
-            Session::open(volery_data::noise(dims, 1), Box::new(SoftwareBackend::new()), Technique::Raycast);
+            Drawer::volume(volery_data::noise(dims, 1), Box::new(SoftwareBackend::new()), How::Raycast);
         let Err(error) = opened else { panic!("{dims:?} was opened") };
         assert!(error.to_string().contains("at least 2"), "{error}");
     }

@@ -3,15 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use volery::info::number;
-use volery::io::scene_file::SceneTechnique;
 use volery::io::write_atomically;
 use volery::output::{ErrorMap, write_image};
 use volery::report::InputFile;
-use volery::{Input, Picture, Report, VerifyError, View, reference};
+use volery::{Data, Input, Picture, Report, Session, Transfer, VerifyError, View, reference};
 
 use super::{Run, empty};
 use crate::args::numbered;
-use crate::drawn::Drawn;
 use crate::progress::Progress;
 use crate::{Failure, save, say};
 
@@ -63,12 +61,11 @@ impl Files<'_> {
 }
 
 /// Writes all that a run of one view asks for, and says what a user wants to know.
-pub(super) fn finish(
+pub(super) fn finish<D: Data>(
     run: &Run,
-    (view, technique): (&View, SceneTechnique),
+    view: &View,
     mut picture: Picture,
-    verify: Option<&Verify>,
-    session: &dyn Drawn,
+    session: &Session<D>,
 ) -> Result<(), Failure> {
     let Run { args, wanted, input, .. } = run;
     name_sources(&mut picture.report, input);
@@ -78,9 +75,11 @@ pub(super) fn finish(
         outputs.push(args.output.clone());
     }
     let (error_map, report) = (args.error_map.as_deref(), args.report.as_deref());
+    let verify = |picture: &mut Picture, progress: &Done| session.verify(view, picture, progress);
+    let verify: Option<&Verify> = if args.is_verified() { Some(&verify) } else { None };
     Files { input: &input.path, outputs, error_map, report }.write(&mut picture, verify)?;
     if let Some(path) = &args.save_scene {
-        save::save_scene(path, wanted, (view, technique), session.has_colors())?;
+        save::save_scene(path, wanted, view, session.data().has_colors())?;
     }
     notes(input.notes(), session, view)?;
     match empty::reason(&picture.image, view, input) {
@@ -152,12 +151,12 @@ fn megabytes(bytes: u64) -> String {
 }
 
 /// Says what the reader decided, and why there may be nothing to see.
-pub(super) fn notes(of_file: &[String], session: &dyn Drawn, view: &View) -> Result<(), Failure> {
+pub(super) fn notes<D: Data>(of_file: &[String], session: &Session<D>, view: &View) -> Result<(), Failure> {
     for note in of_file {
         say(format_args!("note: {note}"))?;
     }
     let [low, high] = session.value_range();
-    if view.stack.classification.is_none() && view.transfer.is_transparent(low, high) {
+    if matches!(&view.transfer, Transfer::Values(transfer) if transfer.is_transparent(low, high)) {
         let [low, high] = [low, high].map(number);
         say(format_args!(
             "note: the transfer function is transparent for all values of the file, {low} to {high}"

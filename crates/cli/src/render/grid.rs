@@ -7,7 +7,9 @@ use volery::io::grid::{TimeStep, read_time_steps};
 use volery::io::scene_file::SceneTechnique;
 use volery::io::{GridFile, GridOptions, recording_files};
 use volery::report::InputFile;
-use volery::{Backend, GridSession, Picture, QuantizedMesh, StackSession, StackView, StepChange, View};
+use volery::{
+    Backend, GridData, How, Picture, QuantizedMesh, Session, StackData, StackView, StepChange, View,
+};
 
 use super::Run;
 use super::files::{self, Done, Files};
@@ -31,7 +33,7 @@ pub(super) fn run(
     run: &Run,
     file: &GridFile,
     steps: &[TimeStep],
-    backend: Box<dyn Backend>,
+    backend: &mut dyn Backend,
 ) -> Result<(), Failure> {
     let Run { args, wanted, input, .. } = run;
     let of_file = |error: &dyn std::error::Error| Failure::of_file(&input.path, error);
@@ -44,26 +46,25 @@ pub(super) fn run(
     let mut session = {
         let _busy = Progress::spinner("numbering edges");
         let array = file.array.as_ref().map(|array| array.name.as_str());
-        GridSession::open(file.grid.clone(), array, backend).map_err(|error| of_file(&error))?
+        Session::new(GridData::new(file.grid.clone(), array).map_err(|error| of_file(&error))?)
     };
-    let view = wanted::view(args, wanted, input, &session)?;
+    let how = wanted::how(wanted, SceneTechnique::Stack);
+    let view = wanted::view(args, wanted, input, &session, how)?;
     if args.is_verified() {
-        view.stack.check_verifiable().map_err(|error| of_file(&error))?;
+        view.check_verifiable().map_err(|error| of_file(&error))?;
     }
     if !steps.is_empty() {
-        return time_steps(run, steps, &mut session, &view);
+        return time_steps(run, steps, (&mut session, backend), &view);
     }
     let picture = {
         let _busy = Progress::spinner("drawing");
-        session.render_frames(&view, args.frames as usize).map_err(|error| of_file(&error))?
+        session.render_frames(&view, args.frames as usize, backend).map_err(|error| of_file(&error))?
     };
-    let verify = |picture: &mut Picture, progress: &Done| session.verify(&view, picture, progress);
-    let verify: Option<&files::Verify> = if args.is_verified() { Some(&verify) } else { None };
-    files::finish(run, (&view, SceneTechnique::Stack), picture, verify, &session)
+    files::finish(run, &view, picture, &session)
 }
 
 /// Draws slices from a file.
-pub(super) fn run_stack(run: &Run, mesh: &QuantizedMesh, backend: Box<dyn Backend>) -> Result<(), Failure> {
+pub(super) fn run_stack(run: &Run, mesh: &QuantizedMesh, backend: &mut dyn Backend) -> Result<(), Failure> {
     let Run { args, wanted, input, .. } = run;
     let of_file = |error: &dyn std::error::Error| Failure::of_file(&input.path, error);
     let verified = args.is_verified().then(|| "--verify and --error-map".to_owned());
@@ -75,31 +76,38 @@ pub(super) fn run_stack(run: &Run, mesh: &QuantizedMesh, backend: Box<dyn Backen
         let problem = format!("is a stack of slices, expected what they are made of for {option}");
         return Err(Failure::of_file(&input.path, problem));
     }
-    let mut session = StackSession::open(mesh.clone(), backend).map_err(|error| of_file(&error))?;
-    let view = wanted::view(args, wanted, input, &session)?;
+    let mut session = Session::new(StackData::new(mesh.clone()).map_err(|error| of_file(&error))?);
+    let how = How::Slices { is_lit: wanted.shade };
+    let view = wanted::view(args, wanted, input, &session, how)?;
     let picture = {
         let _busy = Progress::spinner("drawing");
-        session.render_frames(&view, args.frames as usize).map_err(|error| of_file(&error))?
+        session.render_frames(&view, args.frames as usize, backend).map_err(|error| of_file(&error))?
     };
-    files::finish(run, (&view, SceneTechnique::Stack), picture, None, &session)
+    files::finish(run, &view, picture, &session)
 }
 
 /// Draws every time step by one view.
-fn time_steps(run: &Run, steps: &[TimeStep], session: &mut GridSession, view: &View) -> Result<(), Failure> {
+fn time_steps(
+    run: &Run,
+    steps: &[TimeStep],
+    (session, backend): (&mut Session<GridData>, &mut dyn Backend),
+    view: &View,
+) -> Result<(), Failure> {
     let args = run.args;
     let bar = Progress::bar("drawing time steps");
     for (number, step) in steps.iter().enumerate() {
         bar.set(number as f64 / steps.len() as f64);
         let start = Instant::now();
-        let options = GridOptions { array: Some(session.array().to_owned()), ..GridOptions::default() };
+        let options =
+            GridOptions { array: Some(session.data().array().to_owned()), ..GridOptions::default() };
         let (file, opened) = recording_files(|| step.read(&options));
         let file = file?;
         run.outputs.check_inputs(opened.iter().map(|file| file.path.as_path()))?;
         let load_seconds = start.elapsed().as_secs_f64();
         // A step has at least one file.
         let path = step.files.first().map_or(Path::new(""), PathBuf::as_path);
-        let change = session.set_step(file.grid).map_err(|error| Failure::of_file(path, error))?;
-        let drawn = session.render_frames(view, args.frames as usize);
+        let change = session.data_mut().set_step(file.grid).map_err(|error| Failure::of_file(path, error))?;
+        let drawn = session.render_frames(view, args.frames as usize, backend);
         let mut picture = drawn.map_err(|error| Failure::of_file(path, error))?;
         picture.report.input.path = Some(path.to_string_lossy().into_owned());
         picture.report.inputs = opened.iter().map(InputFile::from).collect();
@@ -116,7 +124,7 @@ fn time_steps(run: &Run, steps: &[TimeStep], session: &mut GridSession, view: &V
 fn write_step(
     args: &RenderArgs,
     (number, path): (usize, &Path),
-    session: &GridSession,
+    session: &Session<GridData>,
     view: &View,
     picture: &mut Picture,
 ) -> Result<(), Failure> {

@@ -7,7 +7,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection, Ray};
 
-use crate::{Backend, Content, Cube, Cubes, Frame, Image, TexelType, Thickness, VolumeLayout};
+use crate::{Backend, Content, Cube, Cubes, Frame, Image, Revision, TexelType, Thickness, VolumeLayout};
 
 use super::STOP_TRANSMITTANCE;
 use super::oracle::{assert_background, assert_close, assert_shows_something, chord, each_pixel, over};
@@ -21,6 +21,7 @@ const RMSE: f64 = 2e-4;
 
 fn layout(cells: [u32; 3], spacing: DVec3) -> VolumeLayout {
     VolumeLayout {
+        revision: Revision::new(),
         cells,
         spacing,
         brick_cells: 8,

@@ -4,8 +4,8 @@ use glam::{DVec3, UVec3};
 use volery_scene::{Camera, ControlPoint, Projection, TransferFunction};
 
 use crate::{
-    Backend, Brick, BrickId, Content, Frame, Image, PlacedBrick, RayTransfer, Rays, TexelType, Texels,
-    VolumeLayout,
+    Backend, Brick, BrickId, Content, Frame, Image, PlacedBrick, RayTransfer, Rays, Revision, TexelType,
+    Texels, VolumeLayout,
 };
 
 pub(super) const BACKGROUND: [f32; 3] = [0.125, 0.25, 0.5];
@@ -81,6 +81,7 @@ impl Volume {
         value_at: impl Fn(DVec3) -> f64 + 'static,
     ) -> Self {
         let mut layout = VolumeLayout {
+            revision: Revision::new(),
             cells: dims.map(|n| n - 1),
             spacing,
             brick_cells: storage.brick_cells,

@@ -5,9 +5,11 @@ use proptest::prelude::*;
 use volery_scene::{ControlPoint, TransferFunction};
 
 use super::*;
+use crate::Revision;
 
 fn layout(texel: TexelType, value_range: [f64; 2]) -> VolumeLayout {
     VolumeLayout {
+        revision: Revision::new(),
         cells: [9; 3],
         spacing: DVec3::ONE,
         brick_cells: 9,

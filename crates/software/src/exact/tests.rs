@@ -2,7 +2,7 @@
 
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
-use volery_frame::{RayTransfer, TexelType, VolumeLayout};
+use volery_frame::{RayTransfer, Revision, TexelType, VolumeLayout};
 use volery_reference::Tracer;
 use volery_scene::{ControlPoint, Ray, Samples, TransferFunction, VoxelGrid};
 
@@ -101,6 +101,7 @@ fn cells_of_every_kind_are_those_of_the_reference() {
             let tracer = Tracer::new(&grid, &tf).unwrap();
             let expected = tracer.trace(&Ray { origin: from - way, direction: way.normalize() });
             let layout = VolumeLayout {
+                revision: Revision::new(),
                 cells: [1; 3],
                 spacing: DVec3::ONE,
                 brick_cells: 1,

@@ -1,15 +1,38 @@
 //! What can go wrong in a session.
 
+use volery_frame::DrawError;
 use volery_frame::planes::MAX_PLANES;
-use volery_frame::{DrawError, UploadError};
 use volery_scene::{SampleType, camera, plane};
 
-use super::Focus;
-use crate::technique::{residency, stack};
+use crate::residency;
+use crate::technique::stack;
+use crate::view::{Dial, Focus};
 
-/// Why a volume cannot be drawn.
+/// Why a picture could not be made.
 #[derive(Debug, thiserror::Error)]
-pub enum OpenError {
+pub enum RenderError {
+    /// A technique for other data.
+    #[error("{technique}: data are a {found}, expected {}", if *.technique == "stack" { "cells or slices" } else { "a volume" })]
+    OtherData {
+        /// Name of the technique.
+        technique: &'static str,
+        /// What the data are.
+        found: &'static str,
+    },
+    /// A dial that the technique does not obey.
+    #[error("{technique}: dial is {dial:?}, expected {}", if *.technique == "stack" { "Full" } else { "Full or Tolerance" })]
+    Dial {
+        /// Name of the technique.
+        technique: &'static str,
+        /// As given.
+        dial: Dial,
+    },
+    /// A transfer function of gradients where there are none.
+    #[error("{technique}: transfer function reads magnitudes of gradients, expected one of values")]
+    Magnitudes {
+        /// Name of the technique.
+        technique: &'static str,
+    },
     /// Samples that are colours.
     #[error(
         "{technique}: samples are {found}, expected one channel of numbers (technique plane draws colours)"
@@ -36,26 +59,6 @@ pub enum OpenError {
         /// Most along an axis.
         max: usize,
     },
-    /// Every sample is NaN or infinite.
-    #[error("every sample is blank, expected some finite values")]
-    Blank,
-    /// Values so far apart that their difference is no number.
-    #[error("values from {:e} to {:e}, expected a range below 1.8e308", .range[0], .range[1])]
-    TooWide {
-        /// Smallest and largest value.
-        range: [f64; 2],
-    },
-    /// The pyramid cannot be built.
-    #[error("pyramid: {0}")]
-    Layout(#[from] volery_pyramid::layout::Error),
-    /// The backend cannot hold bricks of this volume.
-    #[error(transparent)]
-    Backend(#[from] UploadError),
-}
-
-/// Why a picture could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum RenderError {
     /// The camera cannot take a picture.
     #[error(transparent)]
     Camera(#[from] camera::Defect),
@@ -134,6 +137,9 @@ pub enum RenderError {
 /// Why a picture could not be compared with the truth.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
+    /// There is no such picture.
+    #[error(transparent)]
+    View(#[from] Box<RenderError>),
     /// The picture shows what the reference does not.
     #[error("reference: knows no {what}, expected a picture without")]
     Unknown {

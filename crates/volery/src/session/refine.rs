@@ -3,7 +3,12 @@
 //! Each picture allows half of the error of the one before, until the view's own tolerance is reached, or less than
 //! [`LEAST_TOLERANCE`]: then the view itself is drawn.
 
-use super::{Picture, RenderError, Session, Step, View};
+use volery_frame::Backend;
+
+use super::{RenderError, Session};
+use crate::data::VolumeData;
+use crate::technique::planes::Step;
+use crate::view::{Dial, View};
 
 /// What the first picture may miss, as a fraction of the value range: the paper's coarsest.
 const FIRST_TOLERANCE: f64 = 0.48;
@@ -13,37 +18,44 @@ const LEAST_TOLERANCE: f64 = 1.0 / 256.0;
 
 /// The pictures of one view, an iterator; see [`Session::refinements`].
 pub struct Refinements<'a> {
-    session: &'a mut Session,
+    session: &'a mut Session<VolumeData>,
+    backend: &'a mut dyn Backend,
     view: View,
     /// Of the next picture; `None` after the last.
     tolerance: Option<f64>,
 }
 
-impl Session {
+impl Session<VolumeData> {
     /// Draws a view of matter again and again with ever smaller tolerances; the last picture is that of
     /// [`Session::render`], bit for bit. Whoever moves on drops the rest.
     ///
     /// # Errors
     /// When the view is not meaningful.
-    pub fn refinements(&mut self, view: &View) -> Result<Refinements<'_>, RenderError> {
+    pub fn refinements<'a>(
+        &'a mut self,
+        view: &View,
+        backend: &'a mut dyn Backend,
+    ) -> Result<Refinements<'a>, RenderError> {
         self.check(view)?;
-        let first = FIRST_TOLERANCE.max(view.tolerance.unwrap_or(0.0));
-        Ok(Refinements { session: self, view: view.clone(), tolerance: Some(first) })
+        let first = FIRST_TOLERANCE.max(own_tolerance(view));
+        Ok(Refinements { session: self, backend, view: view.clone(), tolerance: Some(first) })
     }
 }
 
 impl Refinements<'_> {
     fn picture(&mut self, tolerance: f64) -> Result<Step, RenderError> {
-        let own = self.view.tolerance.unwrap_or(0.0);
+        let own = own_tolerance(&self.view);
         let is_last = tolerance <= own.max(LEAST_TOLERANCE);
-        let picture: Picture = if is_last {
-            self.session.render(&self.view)?
-        } else {
-            self.session.render(&View { tolerance: Some(tolerance), ..self.view.clone() })?
-        };
+        let dial = if is_last { self.view.dial } else { Dial::Tolerance(tolerance) };
+        let picture = self.session.render(&View { dial, ..self.view.clone() }, self.backend)?;
         self.tolerance = (!is_last).then_some((tolerance / 2.0).max(own));
         Ok(Step { picture, is_last })
     }
+}
+
+/// What a view itself may miss.
+fn own_tolerance(view: &View) -> f64 {
+    if let Dial::Tolerance(tolerance) = view.dial { tolerance } else { 0.0 }
 }
 
 impl Iterator for Refinements<'_> {

@@ -24,12 +24,18 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_frame::{Cube, VolumeLayout};
+use volery_frame::{Cube, Thickness, VolumeLayout};
 use volery_octree::{Frustum, Viewpoint};
 use volery_pyramid::{CubeTree, Layout};
-use volery_scene::{Camera, Projection, Sample, VoxelGrid, for_samples};
+use volery_scene::{Camera, Projection, Sample, TransferFunction, VoxelGrid, for_samples};
 
-use crate::session::View;
+use super::raycast::{matter_truth, matter_view};
+use crate::data::VolumeData;
+use crate::residency::Store;
+use crate::session::{RenderError, VerifyError};
+use crate::technique::{Drawing, Kept, Plan, Technique, Work};
+use crate::texels::Encoding;
+use crate::view::{Dial, How, View, ViewOptions};
 
 /// Longest axis in samples.
 pub const MAX_DIM: usize = 1 << 16;
@@ -41,48 +47,109 @@ const CULLED_LEVEL: u32 = 3;
 /// Levels below the root at which the walk is shared among threads.
 const SHARED_LEVELS: u32 = 3;
 
-/// What one frame draws.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
-    /// Back to front.
-    pub cubes: Vec<Cube>,
-    /// How many of each level, the finest first, up to the coarsest that has one.
-    pub cubes_by_level: Vec<usize>,
+/// The technique, with the tree of cubes in the last encoding.
+#[derive(Default)]
+pub(crate) struct Fans {
+    tree: Kept<Encoding, CubeTree>,
 }
 
-impl Plan {
-    /// How many triangles the fans of the cubes have: ten for a cube of which one face is toward the eye, else twelve
-    /// (`volery_cubefan::Fans::triangles`).
-    pub fn num_triangles(&self, layout: &VolumeLayout, camera: &Camera) -> usize {
-        // The eye on the lattice, or the way of the rays.
-        let step = layout.spacing / 2.0;
-        let (eye, way) = match camera.projection {
-            Projection::Perspective { .. } => (Some(camera.eye / step), DVec3::ZERO),
-            Projection::Orthographic { .. } => (None, camera.target - camera.eye),
+impl Technique<VolumeData> for Fans {
+    fn draws(&self, how: &How) -> bool {
+        matches!(how, How::Fans(_))
+    }
+
+    fn view(&self, volume: &VolumeData, options: &ViewOptions, how: How) -> View {
+        matter_view(volume, options, how)
+    }
+
+    fn check(&self, volume: &VolumeData, view: &View) -> Result<(), RenderError> {
+        view.obeyed(|dial| matches!(dial, Dial::Full | Dial::Tolerance(_)))?;
+        view.of_values()?;
+        volume.check_matter(&view.how)?;
+        let dims = volume.grid().dims();
+        if dims.iter().any(|&n| n > MAX_DIM) {
+            return Err(RenderError::TooLong { dims, max: MAX_DIM });
+        }
+        Ok(())
+    }
+
+    fn prepare(&mut self, volume: &VolumeData) {
+        self.tree_for(volume, volume.store());
+    }
+
+    fn plan(&mut self, volume: &mut VolumeData, view: &View) -> Result<Plan, RenderError> {
+        let transfer = view.of_values()?;
+        let store = volume.store_for(transfer);
+        let tree = self.tree_for(volume, store);
+        let tolerance = volume.tolerance(view.dial).unwrap_or(0.0);
+        let of_volume = (volume.grid(), &*tree, volume.source().layout());
+        let cubes = cubes(of_volume, store.encoding, (view, transfer), tolerance);
+        let mut by_level = Vec::new();
+        for cube in &cubes {
+            let level = usize::from(cube.level);
+            if by_level.len() <= level {
+                by_level.resize(level + 1, 0);
+            }
+            by_level[level] += 1;
+        }
+        let thickness = if let How::Fans(thickness) = view.how { thickness } else { Thickness::default() };
+        let work = Work {
+            nodes_by_level: Some(by_level),
+            triangles: Some(num_triangles(&cubes, &store.layout, &view.camera)),
+            ..Work::default()
         };
-        let triangles = |cube: &Cube| {
-            let [low, high] = cube.lattice_bounds(layout);
-            let is_toward = |axis: &usize| match eye {
-                Some(eye) => eye[*axis] < f64::from(low[*axis]) || eye[*axis] > f64::from(high[*axis]),
-                None => way[*axis] != 0.0,
-            };
-            if (0..3).filter(is_toward).count() == 1 { 10 } else { 12 }
-        };
-        self.cubes.par_iter().map(triangles).sum()
+        let drawing = Drawing::Cubes { cubes, thickness };
+        Ok(Plan { drawing, store: Some((store, Vec::new())), work, bound_max: None, geometry_seconds: None })
+    }
+
+    fn truth(
+        &self,
+        volume: &VolumeData,
+        view: &View,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<volery_reference::Image, VerifyError> {
+        matter_truth(volume, view, progress)
     }
 }
 
-/// Chooses, classifies and orders cubes. `tree` is that of `grid`, with `value = offset + scale * texel`; the
-/// tolerance is in data units.
-pub(crate) fn plan(
+impl Fans {
+    fn tree_for(&mut self, volume: &VolumeData, store: Store) -> std::sync::Arc<CubeTree> {
+        let Encoding { scale, offset, .. } = store.encoding;
+        self.tree.get(&store.encoding, || CubeTree::build(volume.grid(), scale, offset))
+    }
+}
+
+/// How many triangles the fans of cubes have: ten for a cube of which one face is toward the eye, else twelve
+/// (`volery_cubefan::Fans::triangles`).
+fn num_triangles(cubes: &[Cube], layout: &VolumeLayout, camera: &Camera) -> usize {
+    // The eye on the lattice, or the way of the rays.
+    let step = layout.spacing / 2.0;
+    let (eye, way) = match camera.projection {
+        Projection::Perspective { .. } => (Some(camera.eye / step), DVec3::ZERO),
+        Projection::Orthographic { .. } => (None, camera.target - camera.eye),
+    };
+    let triangles = |cube: &Cube| {
+        let [low, high] = cube.lattice_bounds(layout);
+        let is_toward = |axis: &usize| match eye {
+            Some(eye) => eye[*axis] < f64::from(low[*axis]) || eye[*axis] > f64::from(high[*axis]),
+            None => way[*axis] != 0.0,
+        };
+        if (0..3).filter(is_toward).count() == 1 { 10 } else { 12 }
+    };
+    cubes.par_iter().map(triangles).sum()
+}
+
+/// Chooses, classifies and orders cubes, back to front. `tree` is that of `grid` in the encoding; the tolerance is in
+/// data units.
+fn cubes(
     (grid, tree, layout): (&VoxelGrid, &CubeTree, &Layout),
-    [scale, offset]: [f64; 2],
-    view: &View,
+    Encoding { scale, offset, .. }: Encoding,
+    (view, transfer): (&View, &TransferFunction),
     tolerance: f64,
-) -> Plan {
+) -> Vec<Cube> {
     let of_texel = |texel: f32| {
-        let (color, opacity) = view.transfer.classify(offset + scale * f64::from(texel));
-        (color.map(|c| c as f32), view.transfer.extinction_of_opacity(opacity) as f32)
+        let (color, opacity) = transfer.classify(offset + scale * f64::from(texel));
+        (color.map(|c| c as f32), transfer.extinction_of_opacity(opacity) as f32)
     };
     // Bytes need no logarithm each.
     let of_bytes: Vec<_> = (0..=u8::MAX).map(|byte| of_texel(byte.into())).collect();
@@ -90,14 +157,14 @@ pub(crate) fn plan(
         let byte = texel as u8;
         if f32::from(byte) == texel { of_bytes[usize::from(byte)] } else { of_texel(texel) }
     };
-    let cubes = for_samples!(grid.samples(), |values| {
+    for_samples!(grid.samples(), |values| {
         let walk = Walk {
             tree,
             voxel: |place: usize| tree.texel(values[place].channel(0)),
             classify: &classify,
             is_transparent: |[min, max]: [f32; 2]| {
                 let [a, b] = [min, max].map(|texel| offset + scale * f64::from(texel));
-                view.transfer.is_transparent(a.min(b), a.max(b))
+                transfer.is_transparent(a.min(b), a.max(b))
             },
             tolerance: tolerance / scale.abs(),
             viewpoint: Viewpoint::of(&view.camera, layout),
@@ -106,16 +173,7 @@ pub(crate) fn plan(
             domain: layout.domain(),
         };
         walk.run()
-    });
-    let mut cubes_by_level = Vec::new();
-    for cube in &cubes {
-        let level = usize::from(cube.level);
-        if cubes_by_level.len() <= level {
-            cubes_by_level.resize(level + 1, 0);
-        }
-        cubes_by_level[level] += 1;
-    }
-    Plan { cubes, cubes_by_level }
+    })
 }
 
 /// A cube by name: level and index.

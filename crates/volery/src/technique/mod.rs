@@ -1,39 +1,184 @@
-//! Techniques: from a scene and its dials to a frame that any backend draws.
+//! Techniques: from data and a view to a plan that any backend draws.
+//!
+//! A technique is a module here and a line in the list of the [data](crate::data) that it draws. It keeps what outlasts
+//! a picture; its plans are plain data, in the words of `volery-frame`.
 
-mod cells;
 pub mod fans;
-pub mod parts;
-pub mod plane;
+pub mod planes;
 pub mod raycast;
-pub mod residency;
 pub mod stack;
 
-use volery_scene::VoxelGrid;
+use std::sync::Arc;
 
-/// How a volume is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Technique {
-    /// Matter along one ray per pixel.
-    Raycast,
-    /// Cutting planes.
-    Plane,
-    /// Cubes of an octree, back to front.
-    Fans,
-}
+use volery_frame::{
+    BlendedBrick, Content, Cube, Cubes, Light, PlacedBrick, Planes, PointTransfer, RayTransfer, Rays,
+    Sampling, Sheet, SheetTransfer, Thickness,
+};
+use volery_pyramid::Node;
+use volery_scene::Plane;
 
-impl Technique {
-    /// Its name on the command line and in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Raycast => "raycast",
-            Self::Plane => "plane",
-            Self::Fans => "fans",
-        }
+use crate::residency::Store;
+use crate::session::{RenderError, VerifyError};
+use crate::view::{How, View, ViewOptions};
+
+/// How data of one kind are drawn.
+pub trait Technique<D>: Send {
+    /// Whether it is the one that a view asks for.
+    fn draws(&self, how: &How) -> bool;
+
+    /// Fills in what a user leaves open.
+    fn view(&self, data: &D, options: &ViewOptions, how: How) -> View;
+
+    /// Whether data, options, transfer function and dial go together; what can be said of any view was said before.
+    ///
+    /// # Errors
+    /// With what does not.
+    fn check(&self, data: &D, view: &View) -> Result<(), RenderError>;
+
+    /// Makes ready what outlasts views: the first picture waits for it.
+    fn prepare(&mut self, data: &D) {
+        let _ = data;
     }
 
-    /// What suits a grid: planes for images and for colours, which have no matter, rays for everything else.
-    pub fn suiting(grid: &VoxelGrid) -> Self {
-        let is_flat = grid.dims().contains(&1);
-        if is_flat || grid.sample_type().channels() > 1 { Self::Plane } else { Self::Raycast }
+    /// Lets go of what was made for the last view alone: several pictures of one are timed as if each were the first.
+    fn forget_view(&mut self) {}
+
+    /// Chooses what to draw of a view that was checked.
+    ///
+    /// # Errors
+    /// When there is nothing to choose from, or too much.
+    fn plan(&mut self, data: &mut D, view: &View) -> Result<Plan, RenderError>;
+
+    /// The exact picture, in `f64`. `progress` hears a number in [0, 1] now and then.
+    ///
+    /// # Errors
+    /// When the reference does not know what is shown, or has no memory for it.
+    fn truth(
+        &self,
+        data: &D,
+        view: &View,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<volery_reference::Image, VerifyError>;
+}
+
+/// What one picture draws.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// What the backend is asked for.
+    pub drawing: Drawing,
+    /// The volume that it belongs to, with the nodes whose bricks must be resident; of grids there is none.
+    pub store: Option<(Store, Vec<Node>)>,
+    /// How much there is to do.
+    pub work: Work,
+    /// No channel of any pixel differs by more from the full resolution; `None` where that is not known.
+    pub bound_max: Option<f64>,
+    /// Seconds of planning that were slicing.
+    pub geometry_seconds: Option<f64>,
+}
+
+/// How much there is to do for a picture; `None` for what there is none of.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Nodes drawn of each level, or cubes.
+    pub nodes_by_level: Option<Vec<usize>>,
+    /// Polygons in which planes cut nodes or cells.
+    pub polygons: Option<usize>,
+    /// Planes that met cells.
+    pub slices: Option<usize>,
+    /// Triangles drawn.
+    pub triangles: Option<usize>,
+    /// Bytes of slices that the technique keeps, and of those that go to the backend now.
+    pub slice_bytes: Option<[u64; 2]>,
+}
+
+/// A [`Content`] that owns what it shows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Drawing {
+    /// Matter along rays.
+    Rays {
+        /// Colour and extinction.
+        transfer: Arc<RayTransfer>,
+        /// Front to back.
+        bricks: Vec<PlacedBrick>,
+    },
+    /// Cutting planes.
+    Planes {
+        /// Which.
+        planes: Vec<Plane>,
+        /// Colour and opacity.
+        transfer: Arc<PointTransfer>,
+        /// In any order.
+        bricks: Vec<BlendedBrick>,
+        /// How samples become a field.
+        sampling: Sampling,
+        /// Whether opacity lets light through.
+        is_transparent: bool,
+        /// Whether bricks are outlined.
+        shows_bricks: bool,
+    },
+    /// Cubes of constant matter.
+    Cubes {
+        /// Back to front.
+        cubes: Vec<Cube>,
+        /// How the length of a ray in them is found.
+        thickness: Thickness,
+    },
+    /// Slices through matter.
+    Sheets {
+        /// Their vertices and triangles.
+        stack: Arc<stack::Stack>,
+        /// Back to front.
+        sheets: Vec<Sheet>,
+        /// Colour and extinction.
+        transfer: Arc<SheetTransfer>,
+        /// What shades them.
+        light: Option<Light>,
+    },
+}
+
+impl Drawing {
+    /// For a backend.
+    pub fn content(&self) -> Content<'_> {
+        match self {
+            Self::Rays { transfer, bricks } => Content::Rays(Rays { transfer, bricks }),
+            Self::Planes { planes, transfer, bricks, sampling, is_transparent, shows_bricks } => {
+                Content::Planes(Planes {
+                    planes,
+                    bricks,
+                    transfer,
+                    sampling: *sampling,
+                    is_transparent: *is_transparent,
+                    shows_bricks: *shows_bricks,
+                })
+            }
+            Self::Cubes { cubes, thickness } => Content::Cubes(Cubes { cubes, thickness: *thickness }),
+            Self::Sheets { stack, sheets, transfer, light } => {
+                Content::Sheets(stack.content(sheets, transfer, *light))
+            }
+        }
+    }
+}
+
+/// The last thing made, and what it was made of.
+#[derive(Debug)]
+pub(crate) struct Kept<K, V>(Option<(K, Arc<V>)>);
+
+impl<K, V> Default for Kept<K, V> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<K: Clone + PartialEq, V> Kept<K, V> {
+    /// What was made of the same key, or else is made now.
+    pub(crate) fn get(&mut self, key: &K, make: impl FnOnce() -> V) -> Arc<V> {
+        match &self.0 {
+            Some((made_of, kept)) if made_of == key => kept.clone(),
+            _ => {
+                let made = Arc::new(make());
+                self.0 = Some((key.clone(), made.clone()));
+                made
+            }
+        }
     }
 }

@@ -14,49 +14,97 @@
 //! # Non-goals
 //! No blending between levels: at the boundary of two levels the field may jump by at most `2 T`.
 
-use volery_frame::PlacedBrick;
-use volery_octree::{Cut, DataTolerance, Frustum, Transparency, Viewpoint, front_to_back, select};
-use volery_pyramid::{Node, NodeSource};
-use volery_scene::{Camera, TransferFunction};
+use volery_frame::{RayTransfer, Revision};
+use volery_octree::{DataTolerance, Frustum, Transparency, Viewpoint, front_to_back, select};
+use volery_pyramid::Node;
+use volery_reference::Tracer;
+use volery_scene::TransferFunction;
 
-use crate::technique::residency::Numbers;
+use crate::data::{Data, VolumeData};
+use crate::fit;
+use crate::residency::Numbers;
+use crate::session::{RenderError, VerifyError};
+use crate::technique::{Drawing, Kept, Plan, Technique, Work};
+use crate::transfer::Preset;
+use crate::view::{Dial, How, View, ViewOptions};
 
-/// Cells of a brick per axis: a brick of bytes is 36 kB then, of which shared boundaries are 9 %.
-///
-/// With 16, the software executor drew engine, heptane and the MRI head 4 to 18 % slower in full resolution,
-/// holding 2 to 21 % fewer bytes; a tolerance of 0.05 then halved the bytes of heptane, where 32 saves a fifth.
-pub const BRICK_CELLS: usize = 32;
-
-/// What one frame draws.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
-    /// The cut of the tree.
-    pub cut: Cut,
-    /// The cut's drawn nodes, front to back.
-    pub nodes: Vec<Node>,
-    /// The same as bricks.
-    pub bricks: Vec<PlacedBrick>,
+/// The technique, with the table of its last transfer function.
+#[derive(Debug, Default)]
+pub(crate) struct Raycast {
+    table: Kept<(TransferFunction, Revision), RayTransfer>,
 }
 
-/// Chooses and orders what to draw. `tolerance` is in data units; the camera is without defects and the
-/// picture not empty.
-pub fn plan(
-    source: &dyn NodeSource,
-    camera: &Camera,
-    [width, height]: [u32; 2],
-    transfer: &TransferFunction,
-    tolerance: f64,
-) -> Plan {
-    let layout = source.layout();
-    let filters = (
-        Transparency { source, transfer },
-        Frustum::new(layout, camera, width, height),
-        DataTolerance { source, tolerance },
-    );
-    let cut = select(layout, filters);
-    let order = front_to_back(layout, &cut.nodes, Viewpoint::of(camera, layout));
-    let nodes: Vec<Node> = order.into_iter().map(|place| cut.nodes[place]).collect();
-    let numbers = Numbers::of(layout);
-    let bricks = nodes.iter().map(|&node| numbers.place(layout, node)).collect();
-    Plan { cut, nodes, bricks }
+impl Technique<VolumeData> for Raycast {
+    fn draws(&self, how: &How) -> bool {
+        matches!(how, How::Raycast)
+    }
+
+    fn view(&self, volume: &VolumeData, options: &ViewOptions, how: How) -> View {
+        matter_view(volume, options, how)
+    }
+
+    fn check(&self, volume: &VolumeData, view: &View) -> Result<(), RenderError> {
+        view.obeyed(|dial| matches!(dial, Dial::Full | Dial::Tolerance(_)))?;
+        view.of_values()?;
+        volume.check_matter(&view.how)
+    }
+
+    fn plan(&mut self, volume: &mut VolumeData, view: &View) -> Result<Plan, RenderError> {
+        let transfer = view.of_values()?;
+        let store = volume.store_for(transfer);
+        let layout = &store.layout;
+        let table =
+            self.table.get(&(transfer.clone(), layout.revision), || RayTransfer::new(transfer, layout));
+        let source = volume.source();
+        let nodes = source.layout();
+        let filters = (
+            Transparency { source, transfer },
+            Frustum::new(nodes, &view.camera, view.width, view.height),
+            DataTolerance { source, tolerance: volume.tolerance(view.dial).unwrap_or(0.0) },
+        );
+        let cut = select(nodes, filters);
+        let order = front_to_back(nodes, &cut.nodes, Viewpoint::of(&view.camera, nodes));
+        let ordered: Vec<Node> = order.into_iter().map(|place| cut.nodes[place]).collect();
+        let numbers = Numbers::of(nodes);
+        let bricks = ordered.iter().map(|&node| numbers.place(nodes, node)).collect();
+        Ok(Plan {
+            drawing: Drawing::Rays { transfer: table, bricks },
+            work: Work { nodes_by_level: Some(cut.nodes_by_level()), ..Work::default() },
+            store: Some((store, ordered)),
+            bound_max: None,
+            geometry_seconds: None,
+        })
+    }
+
+    fn truth(
+        &self,
+        volume: &VolumeData,
+        view: &View,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<volery_reference::Image, VerifyError> {
+        matter_truth(volume, view, progress)
+    }
+}
+
+/// A view of all visible matter of a volume, the camera as near as it can be.
+pub(crate) fn matter_view(volume: &VolumeData, options: &ViewOptions, how: How) -> View {
+    let transfer = options.transfer_or(|| volume.preset_over(Preset::Auto, options.range));
+    let blocks = match &transfer {
+        crate::Transfer::Values(function) => fit::visible_blocks(volume.pyramid(), function),
+        crate::Transfer::Magnitudes(_) => vec![volume.world_bounds()],
+    };
+    let direction = options.direction.unwrap_or_default();
+    options.view(fit::camera(&blocks, direction, options.orthographic, options.aspect()), transfer, how)
+}
+
+/// The exact picture of a volume's matter.
+pub(crate) fn matter_truth(
+    volume: &VolumeData,
+    view: &View,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<volery_reference::Image, VerifyError> {
+    let View { width, height, ref meshes, ref camera, background, .. } = *view;
+    let transfer = view.of_values().map_err(|_| VerifyError::Unknown { what: "gradient magnitudes" })?;
+    let tracer = Tracer::new(volume.grid(), transfer)?;
+    Ok(tracer.among(meshes).render(camera, background, width, height, progress)?)
 }

@@ -23,88 +23,24 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use volery_frame::{
-    Backend, Content, Device, DrawError, Frame, Image, Light, Quantization, Sheet, SheetTransfer,
-    SheetVertices, Sheets, Thickness,
-};
-use volery_scene::{Camera, Projection, Samples, TransferFunction, TransferFunction2d};
-use volery_slicing::{MeshSheet, Planes, QuantizedMesh, Rays, Refinement, SliceMesh, Slicer, error};
+use volery_frame::{Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_reference::GridTracer;
+use volery_scene::{Camera, Projection, Samples};
+use volery_slicing::{MeshSheet, QuantizedMesh, Rays, SliceMesh, error};
 
-use crate::fit;
-use crate::report::{self, Report};
-use crate::session::{BACKGROUND, Picture, PlaneView, RenderError, Times, VerifyError, View, ViewOptions};
+mod stacks;
 
-/// Its name on the command line and in reports.
-pub const NAME: &str = "stack";
+use crate::data::{Data, GridData, StackData};
+use crate::fit::{self, Direction};
+use crate::session::{RenderError, VerifyError};
+use crate::technique::{Drawing, Kept, Plan, Technique, Work};
+use crate::transfer::Preset;
+use crate::view::{Dial, How, StackView, Transfer, View, ViewOptions};
 
-/// How cells are sliced; the technique stack alone reads it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StackView {
-    /// Which planes.
-    pub slicing: Slicing,
-    /// Planes over the extent of the grid along their normal; of semi-adaptive slicing those of the first step.
-    pub num_slices: usize,
-    /// Share of the cells, in [0, 1], that planes are to meet: as long as fewer are met, planes are put between
-    /// others where the cells are. `None`: even planes alone.
-    pub adaptive: Option<f64>,
-    /// Colour and extinction by value and gradient magnitude, in place of the view's transfer function.
-    pub classification: Option<Arc<TransferFunction2d>>,
-    /// Whether a light at the viewer shades matter by its gradient.
-    pub is_lit: bool,
-    /// Whether vertices are kept and sent in 8 bytes in place of 16, 12 in place of 32 with gradients.
-    pub is_quantized: bool,
-}
+use stacks::Stacks;
 
-/// Which planes cut the cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Slicing {
-    /// Perpendicular to the direction of view, for each picture anew.
-    #[default]
-    Immediate,
-    /// Perpendicular to x, y or z, made once: what a camera in motion needs.
-    Axes,
-}
-
-impl StackView {
-    /// Whether cells can be sliced so.
-    pub(crate) fn check(&self) -> Result<(), RenderError> {
-        if self.num_slices == 0 { Err(RenderError::NoSlice) } else { Ok(()) }
-    }
-
-    /// Whether the reference knows what such pictures show.
-    ///
-    /// # Errors
-    /// When they show light or gradient magnitudes.
-    pub fn check_verifiable(&self) -> Result<(), VerifyError> {
-        let what = if self.classification.is_some() { "gradient magnitudes" } else { "light" };
-        if self.needs_gradients() { Err(VerifyError::Unknown { what }) } else { Ok(()) }
-    }
-
-    /// Whether pictures need gradients at the nodes.
-    pub(crate) fn needs_gradients(&self) -> bool {
-        self.is_lit || self.classification.is_some()
-    }
-
-    /// Of the light of matter without a gradient toward the viewer.
-    const AMBIENT: f32 = 0.25;
-
-    fn light(&self, camera: &Camera) -> Option<Light> {
-        self.is_lit.then(|| Light::along_view(camera, Self::AMBIENT))
-    }
-}
-
-impl Default for StackView {
-    fn default() -> Self {
-        Self {
-            slicing: Slicing::default(),
-            num_slices: 128,
-            adaptive: None,
-            classification: None,
-            is_lit: false,
-            is_quantized: false,
-        }
-    }
-}
+/// Of the light of matter without a gradient toward the viewer.
+const AMBIENT: f32 = 0.25;
 
 /// Why cells could not be sliced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -126,18 +62,174 @@ pub enum Error {
     Quantize(#[from] error::Quantize),
 }
 
-/// What a stack was made by: it serves every view that asks for the same.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Recipe {
-    pub(crate) normal: DVec3,
-    pub(crate) num_slices: usize,
-    pub(crate) adaptive: Option<f64>,
-    pub(crate) has_gradients: bool,
-    pub(crate) is_quantized: bool,
+/// The table of a transfer function over a range of values.
+type Table = Kept<(Transfer, [f64; 2]), SheetTransfer>;
+
+/// Slices through a grid, for the last views.
+#[derive(Default)]
+pub(crate) struct OfGrid {
+    stacks: Stacks,
+    table: Table,
 }
 
-/// A stack as backends may keep it.
-pub(crate) struct Stack {
+/// Slices that were made before.
+#[derive(Default)]
+pub(crate) struct OfStack {
+    table: Table,
+}
+
+impl Technique<GridData> for OfGrid {
+    fn draws(&self, how: &How) -> bool {
+        matches!(how, How::Stack(_))
+    }
+
+    fn view(&self, grid: &GridData, options: &ViewOptions, how: How) -> View {
+        view(grid, options, options.direction.unwrap_or_default(), how)
+    }
+
+    fn check(&self, _: &GridData, view: &View) -> Result<(), RenderError> {
+        view.obeyed(|dial| dial == Dial::Full)?;
+        match &view.how {
+            How::Stack(StackView { num_slices: 0, .. }) => Err(RenderError::NoSlice),
+            _ => Ok(()),
+        }
+    }
+
+    fn forget_view(&mut self) {
+        self.stacks.forget_immediate();
+    }
+
+    fn plan(&mut self, grid: &mut GridData, view: &View) -> Result<Plan, RenderError> {
+        let start = Instant::now();
+        let default = StackView::default();
+        let stack_view = if let How::Stack(of_view) = &view.how { of_view } else { &default };
+        if needs_gradients(view) {
+            grid.make_gradients();
+        }
+        self.stacks.follow(grid);
+        self.stacks.make(stack_view, view, grid)?;
+        let shown = self.stacks.shown(stack_view.slicing, &view.camera).ok_or(RenderError::NoSlice)?;
+        let seconds = start.elapsed().as_secs_f64() + grid.take_step_seconds();
+        let plan = plan(shown, &mut self.table, view, grid.value_range());
+        let slice_bytes = plan.work.slice_bytes.map(|[_, sent]| [self.stacks.num_bytes(), sent]);
+        let work = Work { slice_bytes, ..plan.work };
+        Ok(Plan { geometry_seconds: Some(seconds), work, ..plan })
+    }
+
+    fn truth(
+        &self,
+        grid: &GridData,
+        view: &View,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<volery_reference::Image, VerifyError> {
+        view.check_verifiable()?;
+        let Transfer::Values(transfer) = &view.transfer else {
+            return Err(VerifyError::Unknown { what: "gradient magnitudes" });
+        };
+        let tracer = GridTracer::new(grid.with_matter(), grid.values(), transfer)?;
+        let View { camera, background, width, height, meshes, .. } = view;
+        Ok(tracer.among(meshes).render(camera, *background, *width, *height, progress)?)
+    }
+}
+
+impl Technique<StackData> for OfStack {
+    fn draws(&self, how: &How) -> bool {
+        matches!(how, How::Slices { .. })
+    }
+
+    /// Straight at the slices where the options have no direction: seen from the side, slices are lines.
+    fn view(&self, stack: &StackData, options: &ViewOptions, how: How) -> View {
+        let direction = options.direction.unwrap_or_else(|| Direction::facing(stack.stack().normal()));
+        view(stack, options, direction, how)
+    }
+
+    fn check(&self, stack: &StackData, view: &View) -> Result<(), RenderError> {
+        view.obeyed(|dial| dial == Dial::Full)?;
+        if needs_gradients(view) && !stack.has_gradients() { Err(RenderError::NoGradients) } else { Ok(()) }
+    }
+
+    fn plan(&mut self, stack: &mut StackData, view: &View) -> Result<Plan, RenderError> {
+        let range = stack.value_range();
+        Ok(plan(stack.stack_mut(), &mut self.table, view, range))
+    }
+
+    /// # Errors
+    /// Always: what slices were made of is not known.
+    fn truth(
+        &self,
+        _: &StackData,
+        _: &View,
+        _: &(dyn Fn(f64) + Sync),
+    ) -> Result<volery_reference::Image, VerifyError> {
+        Err(VerifyError::Unknown { what: "cells that slices were made of" })
+    }
+}
+
+/// Whether pictures need gradients at the nodes.
+fn needs_gradients(view: &View) -> bool {
+    is_lit(view) || matches!(view.transfer, Transfer::Magnitudes(_))
+}
+
+fn is_lit(view: &View) -> bool {
+    match view.how {
+        How::Stack(StackView { is_lit, .. }) | How::Slices { is_lit } => is_lit,
+        _ => false,
+    }
+}
+
+impl View {
+    /// Whether the reference knows what such pictures of cells show.
+    ///
+    /// # Errors
+    /// When they show light or gradient magnitudes.
+    pub fn check_verifiable(&self) -> Result<(), VerifyError> {
+        if matches!(self.transfer, Transfer::Magnitudes(_)) {
+            Err(VerifyError::Unknown { what: "gradient magnitudes" })
+        } else if is_lit(self) {
+            Err(VerifyError::Unknown { what: "light" })
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// A view of all of a box.
+fn view<D: Data>(data: &D, options: &ViewOptions, direction: Direction, how: How) -> View {
+    let bounds = [data.world_bounds()];
+    let camera = fit::camera(&bounds, direction, options.orthographic, options.aspect());
+    options.view(camera, options.transfer_or(|| data.preset_over(Preset::Auto, options.range)), how)
+}
+
+/// The plan of a stack, with the values of `range`.
+fn plan(stack: &mut Arc<Stack>, table: &mut Table, view: &View, range: [f64; 2]) -> Plan {
+    let transfer = table.get(&(view.transfer.clone(), range), || match &view.transfer {
+        Transfer::Values(transfer) => SheetTransfer::new(transfer, range),
+        Transfer::Magnitudes(function) => SheetTransfer::new_2d(function),
+    });
+    // The plan before is drawn, so nothing is copied.
+    let own = Arc::make_mut(stack);
+    own.orient(&view.camera);
+    let is_new = own.sent.replace(own.revision) != Some(own.revision);
+    let bytes = own.num_bytes();
+    let work = Work {
+        polygons: own.mesh.num_polygons,
+        slices: Some(own.num_slices()),
+        triangles: Some(own.mesh.triangles.len()),
+        slice_bytes: Some([bytes, if is_new { bytes } else { 0 }]),
+        ..Work::default()
+    };
+    let drawing = Drawing::Sheets {
+        sheets: stack.sheets(&view.camera),
+        stack: stack.clone(),
+        transfer,
+        light: is_lit(view).then(|| Light::along_view(&view.camera, AMBIENT)),
+    };
+    Plan { drawing, store: None, work, bound_max: None, geometry_seconds: None }
+}
+
+/// Slices with strips in order for some rays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stack {
     mesh: SliceMesh,
     /// What is drawn in place of the mesh's own vertices.
     quantized: Option<QuantizedMesh>,
@@ -151,37 +243,9 @@ pub(crate) struct Stack {
     sent: Option<u64>,
 }
 
-impl Recipe {
-    /// What a view asks for, by planes perpendicular to a unit vector.
-    pub(crate) fn new(view: &StackView, normal: DVec3) -> Self {
-        let &StackView { slicing: _, num_slices, adaptive, is_quantized, .. } = view;
-        Self { normal, num_slices, adaptive, has_gradients: view.needs_gradients(), is_quantized }
-    }
-
-    /// Slices; `gradients` at the nodes are used where they are needed.
-    pub(crate) fn stack(
-        self,
-        slicer: &Slicer,
-        values: &Samples,
-        gradients: Option<&[DVec3]>,
-    ) -> Result<Stack, Error> {
-        let Self { normal, num_slices, adaptive, has_gradients, is_quantized } = self;
-        let gradients = gradients.filter(|_| has_gradients);
-        let mesh = match adaptive {
-            None => slicer.mesh(&Planes::over(slicer.grid(), normal, num_slices)?, values, gradients)?,
-            Some(share) => {
-                let refinement = Refinement { first_planes: num_slices, share };
-                slicer.mesh_adaptively(normal, refinement, values, gradients)?.0
-            }
-        };
-        let quantized = is_quantized.then(|| QuantizedMesh::new(&mesh)).transpose()?;
-        Ok(Stack::new(mesh, quantized))
-    }
-}
-
 impl Stack {
     /// Of a mesh whose strips are in order for rays along its normal.
-    fn new(mesh: SliceMesh, quantized: Option<QuantizedMesh>) -> Self {
+    pub(crate) fn new(mesh: SliceMesh, quantized: Option<QuantizedMesh>) -> Self {
         let unordered = (mesh.triangles.clone(), mesh.sheets.clone());
         let (rays, revision) = (Rays::Along(mesh.normal), Sheets::next_revision());
         Self { mesh, quantized, unordered, rays, revision, sent: None }
@@ -234,16 +298,15 @@ impl Stack {
         }
     }
 
-    /// Draws, by a backend. Returns the picture, and how many bytes of vertices and triangles it had not been sent.
-    fn draw(
-        &mut self,
-        view: &View,
-        transfer: &SheetTransfer,
-        backend: &mut dyn Backend,
-    ) -> Result<(Image, u64), DrawError> {
-        let sheets = self.sheets(&view.camera);
+    /// For a backend.
+    pub(crate) fn content<'a>(
+        &'a self,
+        sheets: &'a [Sheet],
+        transfer: &'a SheetTransfer,
+        light: Option<Light>,
+    ) -> Sheets<'a> {
         let SliceMesh { normal, origin, points, gradients, triangles, .. } = &self.mesh;
-        let content = Sheets {
+        Sheets {
             revision: self.revision,
             normal: *normal,
             origin: *origin,
@@ -252,21 +315,10 @@ impl Stack {
                 Some(mesh) => quantized_vertices(mesh),
             },
             triangles,
-            sheets: &sheets,
+            sheets,
             transfer,
-            light: view.stack.light(&view.camera),
-        };
-        let frame = Frame {
-            width: view.width,
-            height: view.height,
-            camera: view.camera,
-            background: view.background.map(|c| c as f32),
-            meshes: &view.meshes,
-            content: Content::Sheets(content),
-        };
-        let image = backend.draw(&frame)?.image;
-        let is_new = self.sent.replace(self.revision) != Some(self.revision);
-        Ok((image, if is_new { self.num_bytes() } else { 0 }))
+            light,
+        }
     }
 
     /// The sheets back to front.
@@ -303,130 +355,5 @@ fn quantized_vertices(mesh: &QuantizedMesh) -> SheetVertices<'_> {
         points: &mesh.points,
         gradients: &mesh.gradients,
         quantization: Quantization { low, scale, magnitude_scale },
-    }
-}
-
-/// A view of all of a box.
-pub(crate) fn view(
-    world_bounds: [DVec3; 2],
-    options: &ViewOptions,
-    transfer: impl FnOnce() -> TransferFunction,
-) -> View {
-    let &ViewOptions { width, height, direction, orthographic, .. } = options;
-    let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
-    View {
-        width,
-        height,
-        camera: fit::camera(&[world_bounds], direction.unwrap_or_default(), orthographic, aspect),
-        transfer: options.transfer.clone().unwrap_or_else(transfer),
-        background: BACKGROUND,
-        tolerance: None,
-        planes: PlaneView::default(),
-        thickness: Thickness::default(),
-        stack: options.stack.clone(),
-        meshes: [].into(),
-    }
-}
-
-/// Frames on their way to a picture and its report.
-#[derive(Default)]
-pub(crate) struct Frames {
-    times: Vec<Times>,
-    last: Option<Image>,
-    bytes_uploaded: u64,
-    slices: usize,
-    triangles: usize,
-    polygons: Option<usize>,
-}
-
-impl Frames {
-    /// Draws one of a stack, with the values of `range`; slicing took `geometry` seconds.
-    pub(crate) fn draw(
-        &mut self,
-        stack: &mut Stack,
-        table: &mut Option<Tabulated>,
-        (view, range): (&View, [f64; 2]),
-        backend: &mut dyn Backend,
-        geometry: Option<f64>,
-    ) -> Result<(), DrawError> {
-        let start = Instant::now();
-        let transfer = Tabulated::get(table, view, range);
-        stack.orient(&view.camera);
-        let select = start.elapsed().as_secs_f64();
-        let start = Instant::now();
-        let (image, bytes) = stack.draw(view, transfer, backend)?;
-        let draw = start.elapsed().as_secs_f64();
-        self.times.push(Times { select, geometry, upload: None, draw });
-        self.bytes_uploaded += bytes;
-        (self.slices, self.triangles) = (stack.num_slices(), stack.mesh.triangles.len());
-        self.polygons = stack.mesh.num_polygons;
-        self.last = Some(image);
-        Ok(())
-    }
-
-    /// The last frame, and a report of all.
-    pub(crate) fn picture(
-        self,
-        view: &View,
-        input: report::Input,
-        (device, bytes_resident): (Device, u64),
-        build_seconds: f64,
-    ) -> Result<Picture, RenderError> {
-        let image = self.last.ok_or(RenderError::NoFrame)?;
-        let report = Report {
-            version: report::VERSION,
-            input,
-            inputs: Vec::new(),
-            technique: NAME,
-            thickness: None,
-            backend: report::Backend::of(device),
-            image: report::ImageSize { width: view.width, height: view.height },
-            camera: view.camera,
-            transfer_function: Some(report::transfer_of(view)),
-            seconds: Times::median(&self.times, build_seconds),
-            frames: Times::frames(&self.times),
-            work: report::Work {
-                nodes: None,
-                nodes_by_level: None,
-                bricks: None,
-                bytes_resident,
-                bytes_uploaded: self.bytes_uploaded,
-                polygons: self.polygons,
-                slices: Some(self.slices),
-                triangles: Some(self.triangles),
-            },
-            dial: None,
-            error: None,
-        };
-        Ok(Picture { image, report })
-    }
-}
-
-/// A table, and what it is of.
-pub(crate) struct Tabulated {
-    transfer: TransferFunction,
-    classification: Option<Arc<TransferFunction2d>>,
-    range: [f64; 2],
-    table: SheetTransfer,
-}
-
-impl Tabulated {
-    /// The table that a view asks for, over a range of values: the one that was made, or a new one.
-    pub(crate) fn get<'a>(made: &'a mut Option<Self>, view: &View, range: [f64; 2]) -> &'a SheetTransfer {
-        let View { transfer, stack: StackView { classification, .. }, .. } = view;
-        let is_same = |made: &Self| {
-            made.transfer == *transfer && made.range == range && made.classification == *classification
-        };
-        let new = || Self {
-            transfer: transfer.clone(),
-            classification: classification.clone(),
-            range,
-            table: match classification {
-                None => SheetTransfer::new(transfer, range),
-                Some(function) => SheetTransfer::new_2d(function),
-            },
-        };
-        let same = made.take().filter(is_same);
-        &made.insert(same.unwrap_or_else(new)).table
     }
 }

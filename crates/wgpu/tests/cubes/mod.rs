@@ -1,7 +1,9 @@
 //! Cubes beyond the limits of one buffer and of one texture: the suite's own pictures are small.
 
 use volery_frame::conformance::Property;
-use volery_frame::{Backend, Content, Cube, Cubes, Frame, Image, TexelType, Thickness, VolumeLayout};
+use volery_frame::{
+    Backend, Content, Cube, Cubes, Frame, Image, Revision, TexelType, Thickness, VolumeLayout,
+};
 use volery_scene::{Camera, Projection};
 
 use super::difference;
@@ -22,6 +24,7 @@ fn draw(
     [width, height]: [u32; 2],
 ) -> Image {
     let layout = VolumeLayout {
+        revision: Revision::new(),
         cells,
         spacing: glam::DVec3::ONE,
         brick_cells: 8,

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use volery::glam::DVec3;
-use volery::{Focus, Plane, Sampling, Session, View, ViewOptions};
-use volery_tests::{at_most, data_folder, draw, exact};
+use volery::{Dial, Focus, How, Plane, PlaneView, Sampling, View, ViewOptions, VolumeData};
+use volery_tests::{Drawer, at_most, data_folder, draw, exact, planes_of};
 
 use super::{ENGINE, MOUSE, MRI, Random, colors, read, software};
 
@@ -14,10 +14,10 @@ const ERRORS: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
 const NUM_PLANES: usize = 200;
 
 /// The largest difference of any channel of any pixel.
-fn largest_difference(session: &mut Session, view: &View) -> (f64, f64) {
+fn largest_difference(session: &mut Drawer<VolumeData>, view: &View) -> (f64, f64) {
     let coarse = draw(session, view);
-    let mut full = View { tolerance: None, ..view.clone() };
-    (full.planes.focus, full.planes.max_error) = (None, None);
+    let mut full = View { dial: Dial::Full, ..view.clone() };
+    (planes_of(&mut full).focus, full.dial) = (None, Dial::Full);
     let full = draw(session, &full);
     let differences = coarse.image.pixels.iter().flatten().zip(full.image.pixels.iter().flatten());
     let measured = differences.map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max);
@@ -28,9 +28,9 @@ fn largest_difference(session: &mut Session, view: &View) -> (f64, f64) {
 }
 
 /// Straight at a plane.
-fn facing(session: &Session, plane: Plane, side: u32) -> View {
+fn facing(session: &Drawer<VolumeData>, plane: Plane, side: u32) -> View {
     let mut options = ViewOptions { width: side, height: side, ..ViewOptions::default() };
-    options.planes.planes = vec![plane];
+    options.how = Some(How::Planes(PlaneView { planes: vec![plane], ..PlaneView::default() }));
     session.view(&options)
 }
 
@@ -43,13 +43,13 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn ratios(name: &str, data: &Path) -> Vec<f64> {
     let mut session = software(read(data, name));
     let mut random = Random::new(3);
-    let extent = session.grid().extent();
+    let extent = session.data().grid().extent();
     let mut ratios: [Vec<f64>; 4] = Default::default();
     let mut worst = f64::INFINITY;
     for number in 0..NUM_PLANES {
         let mut view = facing(&session, random.plane(extent), 256);
         let max_error = ERRORS[number % ERRORS.len()];
-        view.planes.max_error = Some(max_error);
+        view.dial = Dial::Error(max_error);
         let (measured, bound) = largest_difference(&mut session, &view);
         assert!(measured <= bound, "{name}, plane {number}: measured {measured}, bound {bound}");
         assert!(bound <= max_error, "{name}, plane {number}: bound {bound}, asked for {max_error}");
@@ -90,22 +90,26 @@ fn every_picture_keeps_the_bound_that_it_reports() {
     let mut random = Random::new(8);
     for name in [ENGINE, MRI] {
         let mut session = software(read(&data, name));
-        let extent = session.grid().extent();
+        let extent = session.data().grid().extent();
         let mut closest = f64::INFINITY;
         for number in 0..120 {
             let mut view = facing(&session, random.plane(extent), 128);
-            view.transfer = if number % 2 == 0 { colors(session.value_range()) } else { view.transfer };
+            view.transfer =
+                if number % 2 == 0 { colors(session.value_range()).into() } else { view.transfer };
             if number % 3 != 0 {
-                view.planes.planes.push(random.plane(extent));
-                view.planes.planes.push(Plane::through(random.point(extent), DVec3::X));
+                planes_of(&mut view).planes.push(random.plane(extent));
+                planes_of(&mut view).planes.push(Plane::through(random.point(extent), DVec3::X));
             }
-            view.planes.is_transparent = number % 4 >= 2;
-            view.planes.sampling = [Sampling::Linear, Sampling::Nearest][number % 5 / 3];
+            planes_of(&mut view).is_transparent = number % 4 >= 2;
+            planes_of(&mut view).sampling = [Sampling::Linear, Sampling::Nearest][number % 5 / 3];
             let quality = [0.0, 0.25, 0.5, 1.0, 2.0][number % 7 % 5];
             let focus = Focus { point: random.point(extent), quality };
-            view.planes.focus = (number % 6 != 0).then_some(focus);
-            view.tolerance = (number % 6 == 0 || number % 11 == 0).then(|| random.between(0.01, 0.4));
-            view.planes.max_error = (number % 5 < 2).then(|| random.between(0.02, 0.4));
+            planes_of(&mut view).focus = (number % 6 != 0).then_some(focus);
+            view.dial = match (number % 6 == 0 || number % 11 == 0, number % 5 < 2) {
+                (true, _) => Dial::Tolerance(random.between(0.01, 0.4)),
+                (false, true) => Dial::Error(random.between(0.02, 0.4)),
+                (false, false) => Dial::Full,
+            };
             let (measured, bound) = largest_difference(&mut session, &view);
             assert!(measured <= bound, "{name}, {number}: measured {measured}, bound {bound}, {view:?}");
             closest = closest.min(bound / measured);
@@ -119,12 +123,12 @@ fn every_picture_keeps_the_bound_that_it_reports() {
 fn colors_keep_their_bound() {
     let mut random = Random::new(21);
     let mut session = software(volery_data::tissue([150, 130, 90]));
-    let extent = session.grid().extent();
+    let extent = session.data().grid().extent();
     let mut ratios = Vec::new();
     for number in 0..60 {
         let mut view = facing(&session, random.plane(extent), 128);
-        view.planes.is_transparent = number % 2 == 0;
-        view.planes.max_error = Some(random.between(0.005, 0.2));
+        planes_of(&mut view).is_transparent = number % 2 == 0;
+        view.dial = Dial::Error(random.between(0.005, 0.2));
         let (measured, bound) = largest_difference(&mut session, &view);
         assert!(measured <= bound, "{number}: measured {measured}, bound {bound}");
         ratios.push(bound / measured);

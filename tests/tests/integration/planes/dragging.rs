@@ -1,9 +1,9 @@
 //! A person drags a plane and looks here and there.
 
 use volery::glam::DVec3;
-use volery::{BackendChoice, ControlPoint, Focus, Plane, Session, Technique, TransferFunction, ViewOptions};
+use volery::{BackendChoice, ControlPoint, Focus, How, Plane, PlaneView, TransferFunction, ViewOptions};
 use volery_scene::Ray;
-use volery_tests::{at_most, backend, data_folder, draw};
+use volery_tests::{Drawer, at_most, backend, data_folder, draw, planes_of};
 
 use super::{MOUSE, Random, read};
 
@@ -32,12 +32,13 @@ fn a_plane_dragged_through_the_mouse(choice: BackendChoice, test: &str) {
     let num_steps = if choice == BackendChoice::Software { 1000 } else { 100 };
     let grid = read(&data, MOUSE);
     let num_samples = grid.num_samples() as f64;
-    let mut session = Session::open(grid, backend, Technique::Plane).unwrap();
-    let extent = session.grid().extent();
+    let mut session = Drawer::volume(grid, backend, How::Planes(PlaneView::default())).unwrap();
+    let extent = session.data().grid().extent();
     // Never black, which the background is.
     let point = |value, level| ControlPoint { value, color: [level; 3], opacity: 1.0 };
     let transfer = TransferFunction::new(vec![point(0.0, 0.2), point(255.0, 1.0)], 1.0).unwrap();
-    let options = ViewOptions { width: 64, height: 64, transfer: Some(transfer), ..ViewOptions::default() };
+    let options =
+        ViewOptions { width: 64, height: 64, transfer: Some(transfer.into()), ..ViewOptions::default() };
     let mut view = session.view(&options);
     view.background = [0.0; 3];
     let mut random = Random::new(1000);
@@ -50,10 +51,10 @@ fn a_plane_dragged_through_the_mouse(choice: BackendChoice, test: &str) {
         let turn = random.direction() * 0.05;
         plane.normal = (plane.normal + turn).normalize();
         plane.distance += random.between(-0.02, 0.02) * extent.length();
-        view.planes.planes = vec![plane];
+        planes_of(&mut view).planes = vec![plane];
         let focus = random.point(extent);
         let on_plane = focus - plane.normal * plane.signed_distance(focus);
-        view.planes.focus = Some(Focus { point: on_plane, quality: random.between(0.2, 1.5) });
+        planes_of(&mut view).focus = Some(Focus { point: on_plane, quality: random.between(0.2, 1.5) });
         let picture = draw(&mut session, &view);
         most_resident = picture.report.work.bytes_resident.max(most_resident);
         uploaded += picture.report.work.bytes_uploaded;

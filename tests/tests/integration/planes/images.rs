@@ -2,16 +2,17 @@
 
 use volery::glam::DVec3;
 use volery::{
-    Backend, BackendChoice, Camera, Focus, Image, Projection, Session, Technique, View, ViewOptions,
+    Backend, BackendChoice, Camera, Data, Focus, How, Image, PlaneView, Projection, View, ViewOptions,
+    VolumeData,
 };
 use volery_octree::{Answer, select};
 use volery_pyramid::{Kind, Layout};
 use volery_software::SoftwareBackend;
-use volery_tests::{Unblended, at_most, backend, data_folder, distance, draw, exact};
+use volery_tests::{Drawer, Unblended, at_most, backend, data_folder, distance, draw, exact, planes_of};
 
 use super::read;
 
-fn view(session: &Session, side: u32) -> View {
+fn view(session: &Drawer<VolumeData>, side: u32) -> View {
     session.view(&ViewOptions { width: side, height: side, ..ViewOptions::default() })
 }
 
@@ -21,8 +22,8 @@ fn an_image_is_shown_as_it_is(choice: BackendChoice, test: &str) {
     let Some(data) = data_folder(test) else { return };
     let Some(backend) = backend(choice, test) else { return };
     let grid = read(&data, "mandrill_512.png");
-    assert_eq!(Technique::suiting(&grid), Technique::Plane);
-    let mut session = Session::open(grid, backend, Technique::Plane).unwrap();
+    let mut session = Drawer::volume(grid, backend, How::Planes(PlaneView::default())).unwrap();
+    assert_eq!(session.data().suiting(), How::Planes(PlaneView::default()));
     let view = view(&session, 300);
     let mut picture = draw(&mut session, &view);
     assert_eq!(picture.report.input.kind, "image");
@@ -30,7 +31,7 @@ fn an_image_is_shown_as_it_is(choice: BackendChoice, test: &str) {
     let found = distance(test, &exact(&picture.image), &truth);
     at_most("largest difference", found.max, 2e-4);
     // Upright: row 0 of the file is at the top, column 0 at the left.
-    let grid = session.grid();
+    let grid = session.data().grid();
     for [x, y] in [[40, 40], [470, 40], [40, 470], [250, 130]] {
         // The picture is .92 full.
         let to_pixel = |i: usize| ((i as f64 / 511.0 - 0.5) * 0.92 + 0.5) * 300.0;
@@ -87,12 +88,12 @@ fn a_focus_in_an_image_leaves_no_seam() {
     let test = "a_focus_in_an_image_leaves_no_seam";
     let Some(data) = data_folder(test) else { return };
     let grid = read(&data, "mandrill_512.png");
-    let cells = volery::technique::plane::BRICK_CELLS as f64;
+    let cells = volery::data::BRICK_CELLS as f64;
     let threshold = (1.0 + 1.0 / cells) / 10.0 + 1e-5;
     let steepest_of = |backend: Box<dyn Backend>| {
-        let mut session = Session::open(grid.clone(), backend, Technique::Plane).unwrap();
+        let mut session = Drawer::volume(grid.clone(), backend, How::Planes(PlaneView::default())).unwrap();
         let mut view = view(&session, 300);
-        view.planes.focus = Some(Focus { point: DVec3::new(200.0, 170.0, 0.0), quality: 0.5 });
+        planes_of(&mut view).focus = Some(Focus { point: DVec3::new(200.0, 170.0, 0.0), quality: 0.5 });
         let mut largest = 0.0_f64;
         for [x, y] in (1..16).flat_map(|j| (1..16).map(move |i| [30 * i, 30 * j])) {
             let target = DVec3::new(f64::from(x), f64::from(y), 0.0);

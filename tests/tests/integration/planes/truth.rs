@@ -8,8 +8,8 @@
 
 use volery::fit::Direction;
 use volery::glam::DVec3;
-use volery::{BackendChoice, Plane, Sampling, Session, Technique, View, ViewOptions, VoxelGrid};
-use volery_tests::{at_most, backend, data_folder, distance, draw, exact};
+use volery::{BackendChoice, How, Plane, PlaneView, Sampling, View, ViewOptions, VolumeData, VoxelGrid};
+use volery_tests::{Drawer, at_most, backend, data_folder, distance, draw, exact, planes_of};
 
 use super::{ENGINE, MOUSE, MRI, Random, TOOTH, colors, read};
 
@@ -19,8 +19,8 @@ const MAX_RMSE: f64 = 5e-7;
 
 /// Views of one oblique plane and of three that cross, from aslant, perspective and orthographic, opaque and
 /// transparent.
-fn views(session: &Session) -> Vec<(String, View)> {
-    let extent = session.grid().extent();
+fn views(session: &Drawer<VolumeData>) -> Vec<(String, View)> {
+    let extent = session.data().grid().extent();
     let oblique = Plane::through(extent * DVec3::new(0.47, 0.52, 0.49), DVec3::new(0.3, 0.5, 0.81) / extent);
     let crossing = [DVec3::X, DVec3::new(0.2, 1.0, 0.1), DVec3::new(-0.1, 0.3, 1.0)]
         .map(|normal| Plane::through(extent * 0.51, normal / extent));
@@ -34,11 +34,11 @@ fn views(session: &Session) -> Vec<(String, View)> {
                     height: 120,
                     direction,
                     orthographic,
-                    transfer: Some(colors(session.value_range())),
+                    transfer: Some(colors(session.value_range()).into()),
                     ..ViewOptions::default()
                 });
-                view.planes.planes.clone_from(&planes);
-                view.planes.is_transparent = is_transparent;
+                planes_of(&mut view).planes.clone_from(&planes);
+                planes_of(&mut view).is_transparent = is_transparent;
                 let projection = if orthographic { "orthographic" } else { "perspective" };
                 let opacity = if is_transparent { "transparent" } else { "opaque" };
                 views.push((format!("{number}, {projection}, {opacity}"), view));
@@ -50,7 +50,7 @@ fn views(session: &Session) -> Vec<(String, View)> {
 
 fn is_the_truth(grid: VoxelGrid, choice: BackendChoice, test: &str) {
     let Some(backend) = backend(choice, test) else { return };
-    let mut session = Session::open(grid, backend, Technique::Plane).unwrap();
+    let mut session = Drawer::volume(grid, backend, How::Planes(PlaneView::default())).unwrap();
     for (what, view) in views(&session) {
         let mut picture = draw(&mut session, &view);
         let truth = session.verify(&view, &mut picture, &|_| ()).unwrap();
@@ -99,9 +99,10 @@ fn tissue(choice: BackendChoice, test: &str) {
 fn the_nearest_sample(choice: BackendChoice, test: &str) {
     let Some(data) = data_folder(test) else { return };
     let Some(backend) = backend(choice, test) else { return };
-    let mut session = Session::open(read(&data, ENGINE), backend, Technique::Plane).unwrap();
+    let mut session =
+        Drawer::volume(read(&data, ENGINE), backend, How::Planes(PlaneView::default())).unwrap();
     for (what, mut view) in views(&session) {
-        view.planes.sampling = Sampling::Nearest;
+        planes_of(&mut view).sampling = Sampling::Nearest;
         let mut picture = draw(&mut session, &view);
         let truth = session.verify(&view, &mut picture, &|_| ()).unwrap();
         let drawn = exact(&picture.image);
@@ -118,12 +119,13 @@ fn the_middle_of_an_even_volume(choice: BackendChoice, test: &str) {
     let Some(data) = data_folder(test) else { return };
     for name in [ENGINE, MOUSE, MRI] {
         let Some(backend) = backend(choice, test) else { return };
-        let mut session = Session::open(read(&data, name), backend, Technique::Plane).unwrap();
+        let mut session =
+            Drawer::volume(read(&data, name), backend, How::Planes(PlaneView::default())).unwrap();
         let direction = Some(Direction { azimuth_deg: 33.0, elevation_deg: 41.0, zoom: 1.1 });
-        let transfer = Some(colors(session.value_range()));
+        let transfer = Some(colors(session.value_range()).into());
         let options = ViewOptions { width: 160, height: 120, direction, transfer, ..ViewOptions::default() };
         let mut view = session.view(&options);
-        view.planes.sampling = Sampling::Nearest;
+        planes_of(&mut view).sampling = Sampling::Nearest;
         let mut picture = draw(&mut session, &view);
         let truth = session.verify(&view, &mut picture, &|_| ()).unwrap();
         let drawn = exact(&picture.image);
@@ -139,11 +141,11 @@ fn the_middle_of_an_even_volume(choice: BackendChoice, test: &str) {
 fn sixteen_planes_hide_one_another_as_in_the_truth() {
     let mut random = Random::new(11);
     let mut session = super::software(volery_data::marschner_lobb_u8(64));
-    let extent = session.grid().extent();
+    let extent = session.data().grid().extent();
     for is_transparent in [false, true] {
         let (_, mut view) = views(&session).swap_remove(0);
-        view.planes.planes = (0..16).map(|_| random.plane(extent)).collect();
-        view.planes.is_transparent = is_transparent;
+        planes_of(&mut view).planes = (0..16).map(|_| random.plane(extent)).collect();
+        planes_of(&mut view).is_transparent = is_transparent;
         let mut picture = draw(&mut session, &view);
         let truth = session.verify(&view, &mut picture, &|_| ()).unwrap();
         let found = distance("sixteen planes", &exact(&picture.image), &truth);

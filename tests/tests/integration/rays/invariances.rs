@@ -3,10 +3,10 @@
 //! Samples and control points are multiples of 2^-20, so that halves of sums and sums with 1e6 are exact.
 
 use glam::DVec3;
-use volery::{BackendChoice, Camera, ControlPoint, Projection, Session, Technique, TransferFunction};
+use volery::{BackendChoice, Camera, ControlPoint, How, Projection, TransferFunction};
 use volery_reference::Image;
 use volery_scene::VoxelGrid;
-use volery_tests::{Shared, at_most, backend, distance, draw, exact, matter_view};
+use volery_tests::{Drawer, Shared, at_most, backend, distance, draw, exact, matter_view};
 
 use super::{BACKGROUND, aslant, filled, noise, shell, transfer, wave};
 
@@ -74,7 +74,7 @@ impl Matter {
 
     /// The picture of a volume that stands for this one.
     fn drawn_as(&self, grid: VoxelGrid, backend: &Shared) -> Image {
-        let mut session = Session::open(grid, Box::new(backend.clone()), Technique::Raycast).unwrap();
+        let mut session = Drawer::volume(grid, Box::new(backend.clone()), How::Raycast).unwrap();
         let view = matter_view(self.camera, self.transfer.clone(), BACKGROUND, SIZE);
         let drawn = exact(&draw(&mut session, &view).image);
         let shown = drawn.pixels().iter().filter(|pixel| (pixel[2] - BACKGROUND[2]).abs() > 1e-3).count();

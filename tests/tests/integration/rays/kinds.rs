@@ -1,10 +1,10 @@
 //! Kinds of scenes in which a picture was wrong in silence. Each is within .01 of the truth, .001 in the mean square.
 
 use glam::DVec3;
-use volery::{BackendChoice, Camera, Projection, Session, Technique, TransferFunction};
+use volery::{BackendChoice, Camera, How, Projection, TransferFunction};
 use volery_reference::Tracer;
 use volery_scene::{Samples, VoxelGrid};
-use volery_tests::{Shared, at_most, backend, distance, draw, exact, matter_view};
+use volery_tests::{Drawer, Shared, at_most, backend, distance, draw, exact, matter_view, values_of};
 
 use super::{BACKGROUND, aslant, filled, noise, shell, transfer, wave};
 
@@ -56,10 +56,10 @@ impl Judge {
         size: [u32; 2],
     ) {
         let backend = Box::new(self.backend.clone());
-        let mut session = Session::open(grid.clone(), backend, Technique::Raycast).unwrap();
+        let mut session = Drawer::volume(grid.clone(), backend, How::Raycast).unwrap();
         let view = matter_view(camera, transfer, BACKGROUND, size);
         let drawn = exact(&draw(&mut session, &view).image);
-        let tracer = Tracer::new(grid, &view.transfer).unwrap().with_tolerance(1e-9);
+        let tracer = Tracer::new(grid, values_of(&view)).unwrap().with_tolerance(1e-9);
         let truth = tracer.render(&camera, BACKGROUND, size[0], size[1], &|_| {}).unwrap();
         let shown = truth.pixels().iter().filter(|&&pixel| pixel != BACKGROUND).count();
         assert!(shown > truth.pixels().len() / 20, "{what}: matter in {shown} pixels only");

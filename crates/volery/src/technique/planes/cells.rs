@@ -11,7 +11,8 @@ use volery_octree::section::ratio;
 use volery_pyramid::{Layout, Node, NodeStats};
 use volery_scene::{Plane, VoxelGrid};
 
-use super::plane::{BRICK_CELLS, mix};
+use super::mix;
+use crate::data::BRICK_CELLS;
 
 /// The finest cells that planes meet.
 pub(crate) struct Cells<'a> {

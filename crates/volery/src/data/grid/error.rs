@@ -5,7 +5,7 @@ use volery_slicing::error;
 
 /// Why a grid, or another time step of it, cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum OpenError {
+pub enum GridError {
     /// An array that is not there.
     #[error("array '{}' is missing, expected one of: {}", .name.escape_debug(), .found.join(", ").escape_debug())]
     NoArray {
@@ -48,7 +48,7 @@ pub enum OpenError {
     Slicer(#[from] error::Slicer),
 }
 
-impl OpenError {
+impl GridError {
     /// The longest side of the box around the cells: the vertices of slices are 32 bits.
     pub const MAX_EXTENT: f64 = 2e30;
 }

@@ -1,15 +1,14 @@
 //! Sessions of grids: what is sliced again, what a time step does, how far pictures are from the truth.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::sync::Arc;
+use volery_tests::{Drawer, stack_of, values_of, with_stack};
 
 use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::{
-    Backend, BackendChoice, CellType, Cells, ControlPoint, GridOpenError, GridSession, Image, Preset,
-    RenderError, Slicing, StackOpenError, StackSession, StackView, StepChange, TransferFunction,
-    TransferFunction2d, UnstructuredGrid, VerifyError, View, ViewOptions, open_backend,
+    Backend, BackendChoice, CellType, Cells, ControlPoint, GridData, GridError, How, Image, Preset,
+    RenderError, Slicing, StackError, StackView, StepChange, Transfer, TransferFunction, TransferFunction2d,
+    UnstructuredGrid, VerifyError, View, ViewOptions, open_backend,
 };
 use volery_scene::transfer2d::{Palette, Sliders};
 
@@ -17,8 +16,8 @@ fn software() -> Box<dyn Backend> {
     open_backend(BackendChoice::Software).unwrap()
 }
 
-fn session_of(grid: impl Into<Arc<UnstructuredGrid>>) -> GridSession {
-    GridSession::open(grid, None, software()).unwrap()
+fn session_of(grid: impl Into<Arc<UnstructuredGrid>>) -> Drawer<GridData> {
+    Drawer::grid(grid, None, software()).unwrap()
 }
 
 fn options(azimuth_deg: f64, orthographic: bool) -> ViewOptions {
@@ -27,7 +26,7 @@ fn options(azimuth_deg: f64, orthographic: bool) -> ViewOptions {
 }
 
 fn sliced(view: &View, num_slices: usize) -> View {
-    View { stack: StackView { num_slices, ..view.stack.clone() }, ..view.clone() }
+    with_stack(view, |stack| stack.num_slices = num_slices)
 }
 
 fn bits(image: &Image) -> Vec<[u32; 3]> {
@@ -55,7 +54,7 @@ fn transfer(low: f64, high: f64) -> TransferFunction {
     TransferFunction::new(points, 1.0).unwrap()
 }
 
-fn rmse(session: &mut GridSession, view: &View) -> f64 {
+fn rmse(session: &mut Drawer<GridData>, view: &View) -> f64 {
     let mut picture = session.render(view).unwrap();
     session.verify(view, &mut picture, &|_| ()).unwrap();
     picture.report.error.unwrap().measured.unwrap().measured_rmse
@@ -74,9 +73,9 @@ fn the_error_falls_at_second_order_with_the_number_of_slices() {
     let [low, high] = session.value_range();
     for orthographic in [false, true] {
         for slicing in [Slicing::Immediate, Slicing::Axes] {
-            let transfer = Some(transfer(low, high));
+            let transfer = Some(transfer(low, high).into());
             let mut view = session.view(&ViewOptions { transfer, ..options(35.0, orthographic) });
-            view.stack.slicing = slicing;
+            stack_of(&mut view).slicing = slicing;
             let errors = [16, 32, 64, 128].map(|slices| rmse(&mut session, &sliced(&view, slices)));
             println!("{slicing:?}, orthographic {orthographic}: rmse {errors:?}");
             for pair in errors.windows(2) {
@@ -96,7 +95,7 @@ fn axes_and_immediate_show_the_same() {
     for (azimuth, orthographic) in [(10.0, false), (45.0, false), (100.0, true), (225.0, false)] {
         let immediate = session.view(&options(azimuth, orthographic));
         let mut axes = immediate.clone();
-        axes.stack.slicing = Slicing::Axes;
+        stack_of(&mut axes).slicing = Slicing::Axes;
         let found = [immediate, axes].map(|view| session.render(&view).unwrap().image);
         let rmse = difference(&found[0], &found[1]);
         println!("{azimuth}, orthographic {orthographic}: rmse {rmse:.6}, at most 0.001");
@@ -109,7 +108,7 @@ fn the_truth_is_near_for_every_type_of_cell() {
     let mut session = session_of(volery_data::cylinder(8));
     for adaptive in [None, Some(1.0)] {
         let mut view = session.view(&options(35.0, false));
-        view.stack.adaptive = adaptive;
+        stack_of(&mut view).adaptive = adaptive;
         let found = rmse(&mut session, &view);
         println!("adaptive {adaptive:?}: rmse {found:.6}, at most 0.001");
         assert!(found < 0.001, "adaptive {adaptive:?}: rmse {found}, expected below 0.001");
@@ -121,7 +120,7 @@ fn opacity_does_not_depend_on_the_number_of_slices() {
     let mut session = session_of(with_values(|_| 1.0));
     let point = |opacity| ControlPoint { value: 1.0, color: [1.0; 3], opacity };
     let transfer = TransferFunction::new(vec![point(0.4)], 0.5).unwrap();
-    let view = session.view(&ViewOptions { transfer: Some(transfer), ..options(35.0, false) });
+    let view = session.view(&ViewOptions { transfer: Some(transfer.into()), ..options(35.0, false) });
     let truth = session.render(&sliced(&view, 2000)).unwrap().image;
     for slices in [50, 100, 150, 200, 250] {
         let found = session.render(&sliced(&view, slices)).unwrap().image;
@@ -144,8 +143,8 @@ fn the_number_of_threads_does_not_matter() {
             let mut session = session_of(grid.clone());
             let mut view = session.view(&options(35.0, false));
             let immediate = session.render(&view).unwrap().image;
-            view.stack.adaptive = Some(1.0);
-            view.stack.num_slices = 32;
+            stack_of(&mut view).adaptive = Some(1.0);
+            stack_of(&mut view).num_slices = 32;
             let adaptive = session.render(&view).unwrap().image;
             [bits(&immediate), bits(&adaptive)]
         })
@@ -159,12 +158,12 @@ fn a_time_step_is_a_new_session_bit_for_bit() {
     for slicing in [Slicing::Immediate, Slicing::Axes] {
         let mut session = session_of(step(0.0));
         let mut view = session.view(&options(35.0, false));
-        view.stack.slicing = slicing;
+        stack_of(&mut view).slicing = slicing;
         let first = session.render(&view).unwrap();
         assert!(first.report.work.bytes_uploaded > 0);
         assert_eq!(session.render(&view).unwrap().report.work.bytes_uploaded, 0, "nothing is new");
         for time in [0.7, 2.0] {
-            assert_eq!(session.set_step(step(time)), Ok(StepChange::Values));
+            assert_eq!(session.data_mut().set_step(step(time)), Ok(StepChange::Values));
             let found = session.render(&view).unwrap().image;
             let mut fresh = session_of(step(time));
             assert_eq!(session.value_range(), fresh.value_range());
@@ -187,13 +186,16 @@ fn a_time_step_with_other_cells_or_holes_is_sliced_anew() {
     let other = UnstructuredGrid::new(other.points().to_vec(), other.cells().clone()).unwrap();
     for grid in [with_values(hole), other.with_array("f", values).unwrap(), with_values(field)] {
         let grid = Arc::new(grid);
-        assert_eq!(session.set_step(grid.clone()), Ok(StepChange::Cells));
+        assert_eq!(session.data_mut().set_step(grid.clone()), Ok(StepChange::Cells));
         let expected = session_of(grid).render(&view).unwrap().image;
         assert!(bits(&session.render(&view).unwrap().image) == bits(&expected));
     }
     let before = session.render(&view).unwrap().image;
-    assert!(matches!(session.set_values(vec![1.0f32; 3]), Err(GridOpenError::NumValues { found: 3, .. })));
-    assert_eq!(session.set_step(with_values(|_| f64::NAN)), Err(GridOpenError::Blank));
+    assert!(matches!(
+        session.data_mut().set_values(vec![1.0f32; 3]),
+        Err(GridError::NumValues { found: 3, .. })
+    ));
+    assert_eq!(session.data_mut().set_step(with_values(|_| f64::NAN)), Err(GridError::Blank));
     assert!(bits(&session.render(&view).unwrap().image) == bits(&before), "an error changes nothing");
 }
 
@@ -235,10 +237,10 @@ fn the_report_says_what_there_was_to_do() {
     assert!(work.polygons.unwrap() > 5_000 && 2 * work.polygons.unwrap() < 3 * work.triangles.unwrap());
     assert!(work.triangles.unwrap() > 10_000 && work.bytes_uploaded > 3 * 10_000 * 12);
     let mut axes = view.clone();
-    axes.stack.slicing = Slicing::Axes;
+    stack_of(&mut axes).slicing = Slicing::Axes;
     session.render(&axes).unwrap();
     let moved = session.view(&options(36.0, true));
-    let moved = View { stack: axes.stack, ..moved };
+    let moved = View { how: axes.how, ..moved };
     let geometry = session.render(&moved).unwrap().report.seconds.geometry.unwrap();
     assert!(geometry < 1e-3, "{geometry} s for stacks that are there");
 }
@@ -253,17 +255,17 @@ fn every_preset_shows_something() {
 
 #[test]
 fn what_cannot_be_drawn_is_an_error() {
-    let open = |grid: UnstructuredGrid, name: Option<&str>| GridSession::open(grid, name, software()).err();
+    let open = |grid: UnstructuredGrid, name: Option<&str>| Drawer::grid(grid, name, software()).err();
     let missing = open(volery_data::cylinder(1), Some("heat")).unwrap();
     assert_eq!(missing.to_string(), "array 'heat' is missing, expected one of: speed2");
     let cylinder = volery_data::cylinder(1);
     let bare = UnstructuredGrid::new(cylinder.points().to_vec(), cylinder.cells().clone()).unwrap();
-    assert_eq!(open(bare.clone(), None), Some(GridOpenError::NoArrays));
+    assert_eq!(open(bare.clone(), None), Some(GridError::NoArrays));
     let wide: Vec<f64> =
         (0..bare.points().len()).map(|i| if i % 2 == 0 { -1.7e308 } else { 1.7e308 }).collect();
-    assert!(matches!(open(bare.with_array("f", wide).unwrap(), None), Some(GridOpenError::TooWide { .. })));
+    assert!(matches!(open(bare.with_array("f", wide).unwrap(), None), Some(GridError::TooWide { .. })));
     let none = UnstructuredGrid::new(vec![DVec3::ZERO], Cells::default()).unwrap();
-    assert_eq!(open(none.with_array("f", vec![1.0]).unwrap(), None), Some(GridOpenError::Blank));
+    assert_eq!(open(none.with_array("f", vec![1.0]).unwrap(), None), Some(GridError::Blank));
     // A point, and a place for what is missing.
     for (corner, expected) in [(0.0_f64, "cells from (0, 0, 0) to (0, 0, 0),"), (1e300, "to (1, 1, 1e300),")]
     {
@@ -277,8 +279,9 @@ fn what_cannot_be_drawn_is_an_error() {
 
     let mut session = session_of(volery_data::cylinder(1));
     let good = session.view(&options(0.0, false));
-    let mut fails =
-        |stack: StackView| session.render(&View { stack, ..good.clone() }).unwrap_err().to_string();
+    let mut fails = |stack: StackView| {
+        session.render(&View { how: How::Stack(stack), ..good.clone() }).unwrap_err().to_string()
+    };
     assert_eq!(fails(StackView { num_slices: 0, ..StackView::default() }), "0 slices, expected at least 1");
     let share = fails(StackView { adaptive: Some(f64::NAN), ..StackView::default() });
     assert!(share.contains("share NaN"), "{share}");
@@ -289,7 +292,7 @@ fn what_cannot_be_drawn_is_an_error() {
     let cells = Cells::new(vec![CellType::Tetrahedron], vec![0, 1, 2, 3]).unwrap();
     let point = UnstructuredGrid::new(vec![DVec3::ONE; 4], cells).unwrap();
     let point = point.with_array("f", vec![1.0, 2.0, 3.0, 4.0]).unwrap();
-    assert!(matches!(open(point, None), Some(GridOpenError::Extent { .. })));
+    assert!(matches!(open(point, None), Some(GridError::Extent { .. })));
 }
 
 #[test]
@@ -298,7 +301,7 @@ fn few_bits_are_nearly_as_good_and_slices_from_a_file_show_the_same() {
     let mut session = session_of(grid.clone());
     let exact = session.view(&options(35.0, false));
     let mut quantized = exact.clone();
-    quantized.stack.is_quantized = true;
+    stack_of(&mut quantized).is_quantized = true;
     let [a, b] = [&exact, &quantized].map(|view| session.render(view).unwrap());
     let rmse = difference(&a.image, &b.image);
     println!("quantised: rmse {rmse:.6}, at most 0.0001");
@@ -307,31 +310,33 @@ fn few_bits_are_nearly_as_good_and_slices_from_a_file_show_the_same() {
 
     let slicer = volery_slicing::Slicer::new(grid.clone()).unwrap();
     let [_, _, forward] = exact.camera.axes();
-    let planes = volery_slicing::Planes::over(&grid, forward, exact.stack.num_slices).unwrap();
+    let planes = volery_slicing::Planes::over(&grid, forward, StackView::default().num_slices).unwrap();
     let mesh = slicer.mesh(&planes, &grid.arrays()[0].values, None).unwrap();
     let file = volery::QuantizedMesh::new(&mesh).unwrap();
-    let mut stack = StackSession::open(file, software()).unwrap();
-    let found = stack.render_frames(&exact, 2).unwrap();
+    let mut stack = Drawer::stack(file, software()).unwrap();
+    let as_they_are = View { how: How::Slices { is_lit: false }, ..exact.clone() };
+    let found = stack.render_frames(&as_they_are, 2).unwrap();
     assert!(bits(&found.image) == bits(&b.image));
     let [_, _, facing] = stack.view(&ViewOptions::default()).camera.axes();
     assert!(facing.dot(forward).abs() > 1.0 - 1e-6, "{facing}, expected along {forward}");
     assert_eq!((found.report.input.kind, found.report.frames.len()), ("stack", 2));
-    let lit = View { stack: StackView { is_lit: true, ..exact.stack.clone() }, ..exact.clone() };
+    let lit = View { how: How::Slices { is_lit: true }, ..exact.clone() };
     assert!(matches!(stack.render_frames(&lit, 1), Err(RenderError::NoGradients)));
-    assert!(matches!(stack.render_frames(&exact, 0), Err(RenderError::NoFrame)));
+    assert!(matches!(stack.render_frames(&as_they_are, 0), Err(RenderError::NoFrame)));
     let empty = volery::QuantizedMesh::new(&volery_slicing::SliceMesh::default()).unwrap();
-    assert_eq!(StackSession::open(empty, software()).err(), Some(StackOpenError::Empty));
+    assert_eq!(Drawer::stack(empty, software()).err(), Some(StackError::Empty));
 }
 
 #[test]
 fn classification_without_magnitudes_is_that_by_value() {
     let mut session = session_of(volery_data::cylinder(5));
     let [low, high] = session.value_range();
-    let by_value = session.view(&ViewOptions { transfer: Some(transfer(low, high)), ..options(35.0, false) });
-    let palette = Palette::from_transfer(&by_value.transfer, [low, high], [0.0, 1.0], [1025, 1]).unwrap();
+    let by_value =
+        session.view(&ViewOptions { transfer: Some(transfer(low, high).into()), ..options(35.0, false) });
+    let palette = Palette::from_transfer(values_of(&by_value), [low, high], [0.0, 1.0], [1025, 1]).unwrap();
     let function = TransferFunction2d::new(palette, Sliders::default()).unwrap();
     let mut by_both = by_value.clone();
-    by_both.stack.classification = Some(Arc::new(function));
+    by_both.transfer = Transfer::Magnitudes(Arc::new(function));
     let [a, b] = [&by_value, &by_both].map(|view| session.render(view).unwrap().image);
     let rmse = difference(&a, &b);
     println!("classified by value and magnitude: rmse {rmse:.6}, at most 0.0001");
@@ -344,7 +349,7 @@ fn classification_without_magnitudes_is_that_by_value() {
 #[test]
 fn light_follows_the_gradient_also_after_a_time_step() {
     // A gradient toward the viewer shows full colour, one across the view the ambient part.
-    let view_along_x = |session: &GridSession, is_lit| {
+    let view_along_x = |session: &Drawer<GridData>, is_lit| {
         let direction = Some(Direction { azimuth_deg: 90.0, elevation_deg: 0.0, zoom: 1.0 });
         let mut view = session.view(&ViewOptions {
             width: 40,
@@ -353,12 +358,13 @@ fn light_follows_the_gradient_also_after_a_time_step() {
             orthographic: true,
             transfer: Some(
                 TransferFunction::new(vec![ControlPoint { value: 0.0, color: [1.0; 3], opacity: 0.5 }], 1.0)
-                    .unwrap(),
+                    .unwrap()
+                    .into(),
             ),
             ..ViewOptions::default()
         });
         view.background = [0.0; 3];
-        view.stack.is_lit = is_lit;
+        stack_of(&mut view).is_lit = is_lit;
         view
     };
     let light = |image: &Image| image.pixels.iter().map(|pixel| f64::from(pixel[0])).sum::<f64>();
@@ -366,8 +372,8 @@ fn light_follows_the_gradient_also_after_a_time_step() {
     let plain = light(&session.render(&view_along_x(&session, false)).unwrap().image);
     let lit = view_along_x(&session, true);
     let along = light(&session.render(&lit).unwrap().image) / plain;
-    let values: Vec<f64> = session.grid().points().iter().map(|point| point.y).collect();
-    assert_eq!(session.set_values(values), Ok(StepChange::Values));
+    let values: Vec<f64> = session.data().grid().points().iter().map(|point| point.y).collect();
+    assert_eq!(session.data_mut().set_values(values), Ok(StepChange::Values));
     let across = light(&session.render(&lit).unwrap().image) / plain;
     println!("lit along the gradient {along:.4}, expected 1; across {across:.4}, expected 0.25");
     assert!((along - 1.0).abs() < 0.01 && (across - 0.25).abs() < 0.01, "{along}, {across}");
@@ -382,7 +388,7 @@ fn opaque_surfaces_stand_among_the_cells() {
     let mesh = volery_scene::TriangleMesh::new(points, triangles, [0.2, 0.9, 0.3]).unwrap();
     for (slicing, orthographic) in [(Slicing::Immediate, false), (Slicing::Axes, true)] {
         let bare = session.view(&options(35.0, orthographic));
-        let bare = View { stack: StackView { slicing, ..bare.stack.clone() }, ..bare };
+        let bare = with_stack(&bare, |stack| stack.slicing = slicing);
         let view = View { meshes: [mesh.clone()].into(), ..bare.clone() };
         let [with, without] = [&view, &bare].map(|view| session.render(view).unwrap().image);
         let seen = difference(&with, &without);

@@ -9,6 +9,14 @@ use volery_pyramid::{Brick, Layout, Node, NodeSource, ReadError};
 
 use crate::texels::{Buffer, Encoding};
 
+/// How a backend stores the bricks of a volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Store {
+    /// What the backend is told.
+    pub layout: VolumeLayout,
+    pub(crate) encoding: Encoding,
+}
+
 /// Texels on their way to the backend at one time.
 pub const BATCH_BYTES: usize = 16 << 20;
 
@@ -39,17 +47,20 @@ pub enum Error {
     Upload(#[from] UploadError),
 }
 
-/// Makes the bricks of these nodes resident, those that are not.
+/// Makes the bricks of these nodes resident, those that are not, in a backend that may hold another volume.
 pub(crate) fn upload(
     source: &dyn NodeSource,
-    encoding: &Encoding,
-    volume: &VolumeLayout,
+    store: &Store,
     nodes: &[Node],
     backend: &mut dyn Backend,
 ) -> Result<Uploaded, Error> {
+    let Store { layout, encoding } = store;
+    if backend.volume() != Some(layout.revision) {
+        backend.set_volume(layout)?;
+    }
     match upload_missing(source, encoding, nodes, backend) {
         Err(Error::Upload(UploadError::PoolFull { .. })) => {
-            backend.set_volume(volume)?;
+            backend.set_volume(layout)?;
             upload_missing(source, encoding, nodes, backend)
         }
         other => other,

@@ -1,17 +1,17 @@
 //! Sessions: what stays resident, what a dial does, what backends are asked for.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
+use volery_tests::Drawer;
 
 use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::{
-    Backend, BackendChoice, ControlPoint, Device, DeviceKind, Image, OpenError, Preset, RenderError,
-    SampleType, Session, Technique, TransferFunction, View, ViewOptions, VoxelGrid, open_backend,
+    Backend, BackendChoice, ControlPoint, Device, DeviceKind, Dial, How, Image, Preset, RenderError,
+    SampleType, Thickness, TransferFunction, View, ViewOptions, VolumeData, VolumeError, VoxelGrid,
+    open_backend,
 };
-use volery_frame::{Brick, BrickId, DrawError, Drawn, Frame, UploadError, VolumeLayout};
+use volery_frame::{Brick, BrickId, DrawError, Drawn, Frame, Revision, UploadError, VolumeLayout};
 
 fn software() -> Box<dyn Backend> {
     open_backend(BackendChoice::Software).unwrap()
@@ -21,11 +21,11 @@ fn small() -> ViewOptions {
     ViewOptions { width: 80, height: 60, ..ViewOptions::default() }
 }
 
-fn session_of(grid: VoxelGrid) -> Session {
-    Session::open(grid, software(), Technique::Raycast).unwrap()
+fn session_of(grid: VoxelGrid) -> Drawer<VolumeData> {
+    Drawer::volume(grid, software(), How::Raycast).unwrap()
 }
 
-fn turned(session: &Session, azimuth_deg: f64) -> View {
+fn turned(session: &Drawer<VolumeData>, azimuth_deg: f64) -> View {
     let direction = Direction { azimuth_deg, elevation_deg: 10.0, zoom: 1.0 };
     session.view(&ViewOptions { direction: Some(direction), ..small() })
 }
@@ -42,13 +42,13 @@ fn only_what_changed_is_uploaded() {
         0,
         "another camera"
     );
-    let recolored = View { transfer: session.preset(Preset::Mri), ..view.clone() };
+    let recolored = View { transfer: session.preset(Preset::Mri).into(), ..view.clone() };
     assert_eq!(
         session.render(&recolored).unwrap().report.work.bricks.unwrap(),
         0,
         "another transfer function"
     );
-    let coarse = session.render(&View { tolerance: Some(0.9), ..view.clone() }).unwrap().report.work;
+    let coarse = session.render(&View { dial: Dial::Tolerance(0.9), ..view.clone() }).unwrap().report.work;
     let coarse_nodes = coarse.nodes_by_level.unwrap()[1..].iter().sum::<usize>();
     assert_eq!(coarse.bricks, Some(coarse_nodes), "coarse nodes are new");
     assert!(coarse_nodes > 0);
@@ -64,7 +64,7 @@ fn a_picture_does_not_depend_on_what_was_drawn_before() {
     let grid = volery_data::marschner_lobb_u8(80);
     let mut used = session_of(grid.clone());
     for azimuth in [10.0, 100.0, 250.0] {
-        let view = View { tolerance: Some(0.3), ..turned(&used, azimuth) };
+        let view = View { dial: Dial::Tolerance(0.3), ..turned(&used, azimuth) };
         used.render(&view).unwrap();
     }
     let view = turned(&used, 40.0);
@@ -79,9 +79,9 @@ fn tolerance_0_draws_the_finest_level_where_the_field_changes() {
     let mut session = session_of(half);
     let point = |value, opacity| ControlPoint { value, color: [1.0; 3], opacity };
     let transfer = TransferFunction::new(vec![point(0.0, 0.01), point(255.0, 0.1)], 1.0).unwrap();
-    let view = session.view(&ViewOptions { transfer: Some(transfer), ..small() });
+    let view = session.view(&ViewOptions { transfer: Some(transfer.into()), ..small() });
     let full = session.render(&view).unwrap();
-    let zero = session.render(&View { tolerance: Some(0.0), ..view.clone() }).unwrap();
+    let zero = session.render(&View { dial: Dial::Tolerance(0.0), ..view.clone() }).unwrap();
     assert!(full.image == zero.image);
     let nodes = full.report.work.nodes_by_level.as_ref().unwrap();
     assert!(nodes[0] > 0 && nodes.iter().sum::<usize>() < 27, "{nodes:?}");
@@ -89,7 +89,7 @@ fn tolerance_0_draws_the_finest_level_where_the_field_changes() {
         zero.report.work.nodes_by_level.as_ref().unwrap(),
         full.report.work.nodes_by_level.as_ref().unwrap()
     );
-    let tiny = session.render(&View { tolerance: Some(1e-12), ..view }).unwrap();
+    let tiny = session.render(&View { dial: Dial::Tolerance(1e-12), ..view }).unwrap();
     assert!(
         tiny.report.work.nodes_by_level.as_ref().unwrap().len() > 1,
         "constant parts may be coarse at any other tolerance"
@@ -106,7 +106,7 @@ fn signed_and_shifted_samples_make_the_same_picture() {
     };
     let draw = |grid: VoxelGrid, shift: f64| {
         let mut session = session_of(grid);
-        let view = session.view(&ViewOptions { transfer: Some(transfer(shift)), ..small() });
+        let view = session.view(&ViewOptions { transfer: Some(transfer(shift).into()), ..small() });
         session.render(&view).unwrap().image
     };
     let grid = |samples: volery::Samples| VoxelGrid::new(unsigned.dims(), DVec3::ONE, samples).unwrap();
@@ -132,33 +132,41 @@ fn signed_and_shifted_samples_make_the_same_picture() {
 fn blank_samples_are_verified_too() {
     let mut session = session_of(volery_data::holes([40, 36, 34], 11, 0.02));
     let view = session.view(&small());
-    for tolerance in [None, Some(0.4)] {
-        let view = View { tolerance, ..view.clone() };
+    for dial in [Dial::Full, Dial::Tolerance(0.4)] {
+        let view = View { dial, ..view.clone() };
         let mut picture = session.render(&view).unwrap();
         session.verify(&view, &mut picture, &|_| {}).unwrap();
         let error = picture.report.error.unwrap().measured.unwrap();
-        println!("tolerance {tolerance:?}: rmse {:.5}, max {:.5}", error.measured_rmse, error.measured_max);
+        println!("{dial:?}: rmse {:.5}, max {:.5}", error.measured_rmse, error.measured_max);
         assert!(error.measured_rmse < 0.01, "rmse {}", error.measured_rmse);
     }
 }
 
 #[test]
 fn what_cannot_be_drawn_is_refused() {
-    let open = |grid| Session::open(grid, software(), Technique::Raycast).err().unwrap();
+    let open = |grid| Drawer::volume(grid, software(), How::Raycast).err().unwrap();
     let colors = VoxelGrid::new([2, 2, 2], DVec3::ONE, vec![[0u8; 4]; 8]).unwrap();
-    assert!(matches!(open(colors), OpenError::Colors { found: SampleType::Rgba8, .. }));
-    assert!(matches!(open(volery_data::noise([4, 1, 4], 0)), OpenError::Flat { dims: [4, 1, 4], .. }));
+    let draw = |grid| {
+        let mut session = session_of(grid);
+        let view = session.view(&small());
+        session.render(&view).err().unwrap()
+    };
+    assert!(matches!(draw(colors), RenderError::Colors { found: SampleType::Rgba8, .. }));
+    assert!(matches!(draw(volery_data::noise([4, 1, 4], 0)), RenderError::Flat { dims: [4, 1, 4], .. }));
     let blank = VoxelGrid::new([2, 2, 2], DVec3::ONE, vec![f64::NAN; 8]).unwrap();
-    assert!(matches!(open(blank), OpenError::Blank));
+    assert!(matches!(open(blank), VolumeError::Blank));
     let mut session = session_of(volery_data::marschner_lobb(12));
     let good = session.view(&small());
     let mut fails = |view: View| session.render(&view).err().unwrap();
     assert!(matches!(fails(View { width: 0, ..good.clone() }), RenderError::Empty { width: 0, height: 60 }));
     assert!(matches!(
-        fails(View { tolerance: Some(f64::NAN), ..good.clone() }),
+        fails(View { dial: Dial::Tolerance(f64::NAN), ..good.clone() }),
         RenderError::Tolerance { .. }
     ));
-    assert!(matches!(fails(View { tolerance: Some(-0.1), ..good.clone() }), RenderError::Tolerance { .. }));
+    assert!(matches!(
+        fails(View { dial: Dial::Tolerance(-0.1), ..good.clone() }),
+        RenderError::Tolerance { .. }
+    ));
     assert!(matches!(
         fails(View { background: [0.0, 1.1, 0.0], ..good.clone() }),
         RenderError::Background { .. }
@@ -172,6 +180,7 @@ fn what_cannot_be_drawn_is_refused() {
 #[derive(Clone, Default)]
 struct Narrow {
     room: usize,
+    volume: Option<Revision>,
     bricks: Arc<Mutex<HashMap<BrickId, usize>>>,
     largest_upload: Arc<Mutex<usize>>,
 }
@@ -181,9 +190,14 @@ impl Backend for Narrow {
         Device { kind: DeviceKind::Software, name: "narrow".to_owned() }
     }
 
-    fn set_volume(&mut self, _: &VolumeLayout) -> Result<(), UploadError> {
+    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
+        self.volume = Some(layout.revision);
         self.bricks.lock().unwrap().clear();
         Ok(())
+    }
+
+    fn volume(&self) -> Option<Revision> {
+        self.volume
     }
 
     fn is_resident(&self, id: BrickId) -> bool {
@@ -225,12 +239,12 @@ impl Backend for Narrow {
 fn a_full_pool_forgets_what_the_frame_does_not_need() {
     let grid = volery_data::noise([65, 65, 65], 3);
     let backend = Narrow { room: 8, ..Narrow::default() };
-    let mut session = Session::open(grid, Box::new(backend.clone()), Technique::Raycast).unwrap();
+    let mut session = Drawer::volume(grid, Box::new(backend.clone()), How::Raycast).unwrap();
     let everything =
         TransferFunction::new(vec![ControlPoint { value: 0.0, color: [1.0; 3], opacity: 0.1 }], 1.0);
-    let fine = session.view(&ViewOptions { transfer: Some(everything.unwrap()), ..small() });
+    let fine = session.view(&ViewOptions { transfer: Some(everything.unwrap().into()), ..small() });
     assert_eq!(session.render(&fine).unwrap().report.work.nodes.unwrap(), 8);
-    let coarse = session.render(&View { tolerance: Some(2.0), ..fine.clone() }).unwrap().report.work;
+    let coarse = session.render(&View { dial: Dial::Tolerance(2.0), ..fine.clone() }).unwrap().report.work;
     assert_eq!(
         (coarse.nodes, coarse.bricks, coarse.bytes_resident),
         (Some(1), Some(1), 1),
@@ -240,7 +254,7 @@ fn a_full_pool_forgets_what_the_frame_does_not_need() {
     // Room for fewer than one frame needs is an error that says so.
     let tight = Narrow { room: 7, ..Narrow::default() };
     let mut session =
-        Session::open(volery_data::noise([65, 65, 65], 3), Box::new(tight), Technique::Raycast).unwrap();
+        Drawer::volume(volery_data::noise([65, 65, 65], 3), Box::new(tight), How::Raycast).unwrap();
     let error = session.render(&fine).unwrap_err().to_string();
     assert!(error.contains('8') && error.contains('7'), "{error}");
 }
@@ -249,31 +263,31 @@ fn a_full_pool_forgets_what_the_frame_does_not_need() {
 fn uploads_come_in_batches_of_bounded_size() {
     let backend = Narrow { room: usize::MAX, ..Narrow::default() };
     let grid = volery_data::ramp([200, 200, 130], DVec3::ONE, DVec3::ONE, 0.0);
-    let mut session = Session::open(grid, Box::new(backend.clone()), Technique::Raycast).unwrap();
+    let mut session = Drawer::volume(grid, Box::new(backend.clone()), How::Raycast).unwrap();
     let everything =
         TransferFunction::new(vec![ControlPoint { value: 0.0, color: [1.0; 3], opacity: 0.1 }], 1.0);
-    let view = session.view(&ViewOptions { transfer: Some(everything.unwrap()), ..small() });
+    let view = session.view(&ViewOptions { transfer: Some(everything.unwrap().into()), ..small() });
     let work = session.render(&view).unwrap().report.work;
     let largest = *backend.largest_upload.lock().unwrap();
-    assert!(largest <= volery::technique::residency::BATCH_BYTES, "{largest}");
+    assert!(largest <= volery::residency::BATCH_BYTES, "{largest}");
     assert!(work.bytes_uploaded > largest as u64, "more than one batch");
 }
 
 #[test]
 fn refinements_come_coarse_first_and_end_with_the_picture_itself() {
-    for technique in [Technique::Raycast, Technique::Fans] {
-        for tolerance in [None, Some(0.0), Some(0.1), Some(0.9)] {
+    for how in [How::Raycast, How::Fans(Thickness::Exact)] {
+        for dial in [Dial::Full, Dial::Tolerance(0.0), Dial::Tolerance(0.1), Dial::Tolerance(0.9)] {
             let grid = volery_data::marschner_lobb_u8(40);
-            let mut session = Session::open(grid, software(), technique).unwrap();
-            let view = View { tolerance, ..session.view(&small()) };
+            let mut session = Drawer::volume(grid, software(), how.clone()).unwrap();
+            let view = View { dial, ..session.view(&small()) };
             let steps: Vec<_> = session.refinements(&view).unwrap().map(Result::unwrap).collect();
             let expected = session.render(&view).unwrap();
             let (last, before) = steps.split_last().unwrap();
-            assert!(last.is_last && last.picture.image == expected.image, "{technique:?} {tolerance:?}");
+            assert!(last.is_last && last.picture.image == expected.image, "{how:?} {dial:?}");
             assert!(before.iter().all(|step| !step.is_last));
             let nodes: Vec<_> = steps.iter().map(|step| step.picture.report.work.nodes.unwrap()).collect();
-            assert!(nodes.is_sorted(), "{technique:?} {tolerance:?}: {nodes:?}");
-            assert_eq!(steps.len() > 1, tolerance != Some(0.9), "{technique:?} {tolerance:?}: {nodes:?}");
+            assert!(nodes.is_sorted(), "{how:?} {dial:?}: {nodes:?}");
+            assert_eq!(steps.len() > 1, dial != Dial::Tolerance(0.9), "{how:?} {dial:?}: {nodes:?}");
         }
     }
 }

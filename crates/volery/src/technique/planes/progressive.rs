@@ -16,12 +16,15 @@
 use std::collections::HashSet;
 use std::time::Instant;
 
+use volery_frame::Backend;
 use volery_octree::{Answer, select};
 use volery_pyramid::{Node, NodeSource};
 
-use super::{Picture, Plan, RenderError, Session, Times, View};
-use crate::technique::plane;
-use crate::technique::residency::{self, Uploaded};
+use super::{Chosen, Planes, choose};
+use crate::data::{Data, VolumeData};
+use crate::residency::{self, Uploaded};
+use crate::session::{Picture, RenderError, Session, Times};
+use crate::view::{How, PlaneView, View};
 
 /// One picture on the way to the last.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,11 +37,14 @@ pub struct Step {
 
 /// The pictures of one view, an iterator; see [`Session::progressive`].
 pub struct Progressive<'a> {
-    session: &'a mut Session,
+    session: &'a mut Session<VolumeData>,
+    backend: &'a mut dyn Backend,
+    technique: Planes,
     arrivals: Option<&'a dyn NodeSource>,
     view: View,
+    planes: PlaneView,
     bricks_per_step: usize,
-    target: plane::Plan,
+    target: Chosen,
     /// All nodes that will be resident.
     wanted: HashSet<Node>,
     /// Those that are not yet, the most wanted one last.
@@ -46,24 +52,27 @@ pub struct Progressive<'a> {
     is_done: bool,
 }
 
-impl Session {
+impl Session<VolumeData> {
     /// Draws a view again and again, each time with at most `bricks_per_step` bricks more (at least 1), until it
     /// is complete. `arrivals` is where bricks come from, a pyramid of this volume that may deliver late; if
     /// missing, the session's own.
     ///
     /// # Errors
-    /// When the view is not meaningful, or the session's technique has no such pictures: only planes have.
+    /// When the view is not meaningful, or not of planes: other techniques have no such pictures.
     pub fn progressive<'a>(
         &'a mut self,
         view: &View,
         arrivals: Option<&'a dyn NodeSource>,
         bricks_per_step: usize,
+        backend: &'a mut dyn Backend,
     ) -> Result<Progressive<'a>, RenderError> {
         self.check(view)?;
-        let Plan::Planes(target) = self.plan(view) else {
-            return Err(RenderError::NotProgressive { technique: self.technique.name() });
+        let How::Planes(planes) = &view.how else {
+            return Err(RenderError::NotProgressive { technique: view.how.name() });
         };
-        let layout = self.source.layout();
+        let volume = self.data();
+        let target = choose(volume, view, planes);
+        let layout = volume.source().layout();
         let mut wanted = HashSet::new();
         for &node in &target.cut.nodes {
             let levels = node.level..layout.num_levels();
@@ -72,7 +81,7 @@ impl Session {
         }
         let distance = |node: &Node| {
             let [low, high] = layout.world_bounds(*node);
-            view.planes.focus.map_or(0.0, |focus| ((low + high) / 2.0).distance(focus.point))
+            planes.focus.map_or(0.0, |focus| ((low + high) / 2.0).distance(focus.point))
         };
         let mut missing: Vec<(f64, Node)> = wanted.iter().map(|node| (distance(node), *node)).collect();
         missing.sort_by(|(a_distance, a), (b_distance, b)| {
@@ -81,8 +90,11 @@ impl Session {
         });
         Ok(Progressive {
             session: self,
+            backend,
+            technique: Planes::default(),
             arrivals,
             view: view.clone(),
+            planes: planes.clone(),
             bricks_per_step: bricks_per_step.max(1),
             target,
             wanted,
@@ -100,28 +112,33 @@ impl Progressive<'_> {
 
     fn step(&mut self) -> Result<Step, RenderError> {
         let start = Instant::now();
-        let uploaded = self.receive()?;
+        let mut uploaded = self.receive()?;
         let upload = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let is_last = self.missing.is_empty();
-        let plan = if is_last { self.target.clone() } else { self.finest_plan() };
+        let chosen = if is_last { self.target.clone() } else { self.finest() };
+        let plan = self.technique.plan_of(self.session.data_mut(), (&self.view, &self.planes), chosen)?;
         let select = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let plan = Plan::Planes(plan);
         // Where the backend's memory was full, it may have forgotten what is shown.
-        let mut uploaded = uploaded;
-        uploaded += self.session.upload(plan.nodes())?;
-        let drawn = self.session.draw(&self.view, &plan)?;
+        uploaded += self.session.upload(&plan, self.backend)?;
+        let drawn = self.session.draw(&self.view, &plan, self.backend)?;
         let draw = start.elapsed().as_secs_f64();
-        let times = Times { select, geometry: None, upload: Some(upload), draw };
-        let report = self.session.report(&self.view, (&plan, drawn.ray_doubt), uploaded, &[times]);
-        Ok(Step { picture: Picture { image: drawn.image, report }, is_last })
+        let times = [Times { select, geometry: None, upload: Some(upload), draw }];
+        let picture = self.session.picture(&self.view, plan, drawn, (uploaded, &times), self.backend);
+        Ok(Step { picture, is_last })
     }
 
     /// Makes bricks resident that are at hand, or waits for the most wanted one.
     fn receive(&mut self) -> Result<Uploaded, RenderError> {
-        let Session { source, encoding, volume, backend, .. } = &mut *self.session;
-        let source: &dyn NodeSource = self.arrivals.unwrap_or(source);
+        let store = match &self.view.transfer {
+            crate::Transfer::Values(transfer) if !self.session.data().has_colors() => {
+                self.session.data_mut().store_for(transfer)
+            }
+            _ => self.session.data().store(),
+        };
+        let own = self.session.data().source();
+        let source: &dyn NodeSource = self.arrivals.unwrap_or(own);
         let mut arrived: Vec<Node> = Vec::new();
         let root = source.layout().root();
         for &node in self.missing.iter().rev() {
@@ -134,14 +151,15 @@ impl Progressive<'_> {
             arrived.extend(self.missing.last());
         }
         let here: HashSet<Node> = arrived.iter().copied().collect();
-        let uploaded = residency::upload(source, encoding, volume, &arrived, backend.as_mut())?;
+        let uploaded = residency::upload(source, &store, &arrived, self.backend)?;
         self.missing.retain(|node| !here.contains(node));
         Ok(uploaded)
     }
 
-    /// The finest plan that the bricks which are there allow.
-    fn finest_plan(&self) -> plane::Plan {
-        let layout = self.session.source.layout();
+    /// The finest choice that the bricks which are there allow.
+    fn finest(&self) -> Chosen {
+        let volume = self.session.data();
+        let layout = volume.source().layout();
         let missing: HashSet<Node> = self.missing.iter().copied().collect();
         // Levels above this one are complete.
         let incomplete = self.missing.iter().map(|node| node.level).max().unwrap_or(0);
@@ -159,7 +177,7 @@ impl Progressive<'_> {
             if is_drawn { Answer::Draw } else { Answer::Descend }
         };
         let cut = select(layout, answer);
-        plane::Plan::of(&self.session.source, self.session.parts(&self.view), &self.view, cut)
+        Chosen::of(volume, (&self.view, &self.planes), cut)
     }
 }
 

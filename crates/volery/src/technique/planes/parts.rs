@@ -17,10 +17,10 @@ use volery_pyramid::{Kind, Layout, Node, NodeSource, NodeStats, Pyramid};
 use volery_scene::{Plane, VoxelGrid};
 
 use super::cells::Cells;
-use super::plane::BRICK_CELLS;
+use crate::data::BRICK_CELLS;
 
 /// Cells of a part per axis.
-pub const CELLS: usize = 6;
+pub(crate) const CELLS: usize = 8;
 
 /// Parts of a node per axis.
 const PARTS: u32 = (BRICK_CELLS / CELLS) as u32;

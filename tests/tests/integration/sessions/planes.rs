@@ -1,22 +1,22 @@
 //! The technique plane: pictures that get better as data arrive, and what dials promise.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::sync::atomic::{AtomicUsize, Ordering};
+use volery_tests::{Drawer, planes_of};
 
 use volery::glam::DVec3;
 use volery::{
-    BackendChoice, Focus, Image, OpenError, Plane, RenderError, Sampling, Session, Step, Technique, View,
-    ViewOptions, VoxelGrid, open_backend,
+    BackendChoice, Dial, Focus, How, Image, Plane, PlaneView, RenderError, Sampling, Step, View, ViewOptions,
+    VolumeData, VolumeError, VoxelGrid, open_backend,
 };
 use volery_octree::{Cut, low_corners};
 use volery_pyramid::{Brick, Kind, Layout, Node, NodeSource, NodeStats, Pyramid, ReadError};
 use volery_scene::SampleType;
 
-const CELLS: usize = volery::technique::plane::BRICK_CELLS;
+const CELLS: usize = volery::data::BRICK_CELLS;
 
-fn session_of(grid: VoxelGrid) -> Session {
-    Session::open(grid, open_backend(BackendChoice::Software).unwrap(), Technique::Plane).unwrap()
+fn session_of(grid: VoxelGrid) -> Drawer<VolumeData> {
+    Drawer::volume(grid, open_backend(BackendChoice::Software).unwrap(), How::Planes(PlaneView::default()))
+        .unwrap()
 }
 
 fn head() -> VoxelGrid {
@@ -24,24 +24,25 @@ fn head() -> VoxelGrid {
 }
 
 /// Two planes, seen from aslant.
-fn view_of(session: &Session) -> View {
-    let extent = session.grid().extent();
-    let mut options = ViewOptions { width: 90, height: 80, ..ViewOptions::default() };
-    options.planes.planes = vec![
+fn view_of(session: &Drawer<VolumeData>) -> View {
+    let extent = session.data().grid().extent();
+    let planes = vec![
         Plane::through(extent * 0.48, DVec3::new(0.3, 0.5, 0.81)),
         Plane::through(extent * 0.52, DVec3::new(1.0, -0.2, 0.1)),
     ];
-    session.view(&options)
+    let how = Some(How::Planes(PlaneView { planes, ..PlaneView::default() }));
+    session.view(&ViewOptions { width: 90, height: 80, how, ..ViewOptions::default() })
 }
 
 /// Full resolution, a focus, a largest error, and both.
-fn dials(session: &Session) -> Vec<View> {
+fn dials(session: &Drawer<VolumeData>) -> Vec<View> {
     let view = view_of(session);
-    let point = session.grid().extent() * DVec3::new(0.4, 0.2, 0.6);
+    let point = session.data().grid().extent() * DVec3::new(0.4, 0.2, 0.6);
     let focus = Some(Focus { point, quality: 0.6 });
-    let with = |focus, max_error| {
+    let with = |focus, max_error: Option<f64>| {
         let mut view = view.clone();
-        (view.planes.focus, view.planes.max_error) = (focus, max_error);
+        planes_of(&mut view).focus = focus;
+        view.dial = max_error.map_or(Dial::Full, Dial::Error);
         view
     };
     vec![view.clone(), with(focus, None), with(None, Some(0.25)), with(focus, Some(0.1))]
@@ -138,7 +139,7 @@ fn late_bricks_make_pictures_that_get_better() {
         for (number, view) in dials(&session_of(grid.clone())).iter().enumerate() {
             let mut session = session_of(grid.clone());
             let mut finest = view.clone();
-            (finest.planes.focus, finest.planes.max_error) = (None, None);
+            (planes_of(&mut finest).focus, finest.dial) = (None, Dial::Full);
             let truth = session_of(grid.clone()).render(&finest).unwrap().image;
             let expected = session_of(grid.clone()).render(view).unwrap().image;
             let late = Late::new(&grid, seed, 3000);
@@ -154,7 +155,7 @@ fn late_bricks_make_pictures_that_get_better() {
                 errors.push(rmse(&step.picture.image, &truth));
                 let shown =
                     |image: &Image| image.pixels.iter().map(|p| *p == image.pixels[0]).collect::<Vec<_>>();
-                if view.planes.max_error.is_none() && errors.len() == 1 {
+                if !matches!(view.dial, Dial::Error(_)) && errors.len() == 1 {
                     let background = shown(&truth).iter().filter(|is| **is).count();
                     let found = shown(&step.picture.image).iter().filter(|is| **is).count();
                     assert_eq!(found, background, "the first picture has no hole");
@@ -193,7 +194,7 @@ fn no_picture_on_the_way_has_a_seam() {
     let grid = VoxelGrid::new(dims, DVec3::ONE, grid_values).unwrap();
     let mut session = session_of(grid.clone());
     let mut view = session.view(&ViewOptions { width: 700, height: 700, ..ViewOptions::default() });
-    view.planes.focus = Some(Focus { point: DVec3::new(60.0, 70.0, 0.0), quality: 0.5 });
+    planes_of(&mut view).focus = Some(Focus { point: DVec3::new(60.0, 70.0, 0.0), quality: 0.5 });
     let late = Late::new(&grid, 4, 600);
     let mut num_levels = 0;
     for step in session.progressive(&view, Some(&late), 2).unwrap() {
@@ -243,16 +244,16 @@ fn a_focus_sends_less_and_every_dial_keeps_its_promise() {
     }
     // Ends of the dials.
     let mut zero = views[1].clone();
-    zero.planes.focus.as_mut().unwrap().quality = 0.0;
+    planes_of(&mut zero).focus.as_mut().unwrap().quality = 0.0;
     assert_eq!(session_of(grid.clone()).render(&zero).unwrap().report.work.nodes.unwrap(), 1);
-    for (quality, max_error) in [(f64::INFINITY, None), (f64::INFINITY, Some(0.0))] {
+    for (quality, dial) in [(f64::INFINITY, Dial::Full), (f64::INFINITY, Dial::Error(0.0))] {
         let mut sharp = views[1].clone();
-        sharp.planes.focus.as_mut().unwrap().quality = quality;
-        sharp.planes.max_error = max_error;
-        assert!(sent(&sharp).2 == full, "quality {quality}, error {max_error:?}");
+        planes_of(&mut sharp).focus.as_mut().unwrap().quality = quality;
+        sharp.dial = dial;
+        assert!(sent(&sharp).2 == full, "quality {quality}, {dial:?}");
     }
     let mut zero = views[2].clone();
-    zero.planes.max_error = Some(0.0);
+    zero.dial = Dial::Error(0.0);
     assert!(sent(&zero).2 == full);
 }
 
@@ -262,15 +263,15 @@ fn the_nearest_sample_has_a_bound_of_its_own() {
     let grid = volery_data::ramp([121, 121, 121], DVec3::ONE, DVec3::new(1.0, 0.5, 0.2), 3.0);
     let mut session = session_of(grid);
     let mut view = view_of(&session);
-    view.planes.sampling = Sampling::Nearest;
+    planes_of(&mut view).sampling = Sampling::Nearest;
     let full = session.render(&view).unwrap().image;
-    view.planes.focus = Some(Focus { point: DVec3::ZERO, quality: 0.5 });
+    planes_of(&mut view).focus = Some(Focus { point: DVec3::ZERO, quality: 0.5 });
     let coarse = session.render(&view).unwrap();
     let bound = coarse.report.error.unwrap().bound_max.unwrap();
     let measured = largest_difference(&coarse.image, &full);
     println!("nearest: measured {measured:.4}, bound {bound:.4}");
     assert!(measured > 0.001 && measured <= bound);
-    view.planes.sampling = Sampling::Linear;
+    planes_of(&mut view).sampling = Sampling::Linear;
     let linear = session.render(&view).unwrap().report.error.unwrap().bound_max.unwrap();
     assert!(linear < 1e-4, "a ramp is the same field on every level: {linear}");
 }
@@ -291,8 +292,12 @@ fn the_cut_of_a_plan_is_balanced_and_blended() {
 #[test]
 fn what_cannot_be_drawn_is_refused() {
     let blank = VoxelGrid::new([2, 2, 2], DVec3::ONE, vec![f64::NAN; 8]).unwrap();
-    let opened = Session::open(blank, open_backend(BackendChoice::Software).unwrap(), Technique::Plane);
-    assert!(matches!(opened.err(), Some(OpenError::Blank)));
+    let opened = Drawer::volume(
+        blank,
+        open_backend(BackendChoice::Software).unwrap(),
+        How::Planes(PlaneView::default()),
+    );
+    assert!(matches!(opened.err(), Some(VolumeError::Blank)));
     let mut session = session_of(volery_data::marschner_lobb(12));
     let good = view_of(&session);
     let mut fails = |change: &dyn Fn(&mut View)| {
@@ -300,18 +305,19 @@ fn what_cannot_be_drawn_is_refused() {
         change(&mut view);
         session.render(&view).err().unwrap()
     };
-    assert!(matches!(fails(&|view| view.planes.planes.clear()), RenderError::NumPlanes { found: 0 }));
-    let many = |view: &mut View| view.planes.planes = vec![Plane::through(DVec3::ZERO, DVec3::X); 17];
+    assert!(matches!(fails(&|view| planes_of(view).planes.clear()), RenderError::NumPlanes { found: 0 }));
+    let many = |view: &mut View| planes_of(view).planes = vec![Plane::through(DVec3::ZERO, DVec3::X); 17];
     assert!(matches!(fails(&many), RenderError::NumPlanes { found: 17 }));
-    let none = |view: &mut View| view.planes.planes[1].normal = DVec3::ZERO;
+    let none = |view: &mut View| planes_of(view).planes[1].normal = DVec3::ZERO;
     assert!(matches!(fails(&none), RenderError::Plane { index: 1, .. }));
-    let focus = |point, quality| move |view: &mut View| view.planes.focus = Some(Focus { point, quality });
+    let focus =
+        |point, quality| move |view: &mut View| planes_of(view).focus = Some(Focus { point, quality });
     assert!(matches!(fails(&focus(DVec3::NAN, 1.0)), RenderError::Focus { .. }));
     assert!(matches!(fails(&focus(DVec3::ZERO, f64::NAN)), RenderError::Focus { .. }));
     assert!(matches!(fails(&focus(DVec3::ZERO, -1.0)), RenderError::Focus { .. }));
-    assert!(matches!(fails(&|view| view.planes.max_error = Some(1.5)), RenderError::MaxError { found: 1.5 }));
+    assert!(matches!(fails(&|view| view.dial = Dial::Error(1.5)), RenderError::MaxError { found: 1.5 }));
     let mut rays =
-        Session::open(head(), open_backend(BackendChoice::Software).unwrap(), Technique::Raycast).unwrap();
+        Drawer::volume(head(), open_backend(BackendChoice::Software).unwrap(), How::Raycast).unwrap();
     let view = rays.view(&ViewOptions::default());
     assert!(matches!(rays.progressive(&view, None, 1).err(), Some(RenderError::NotProgressive { .. })));
 }

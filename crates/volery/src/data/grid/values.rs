@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use volery_frame::Revision;
 use volery_scene::{Samples, UnstructuredGrid, for_samples};
-use volery_slicing::{blank_where_not_finite, node_gradients};
+use volery_slicing::blank_where_not_finite;
 
-use super::stacks::Stacks;
-use super::{GridSession, OpenError, Shape};
+use super::{GridData, GridError, Shape};
 
 /// What a time step changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,13 +18,13 @@ pub enum StepChange {
     Cells,
 }
 
-impl GridSession {
-    /// Takes another time step: the array of the same name of another grid. From then on pictures are those of a new
-    /// session with it, bit for bit. Where points and cells are the same, no stack is sliced for that.
+impl GridData {
+    /// Takes another time step: the array of the same name of another grid. From then on pictures are those of new
+    /// data of it, bit for bit. Where points and cells are the same, no stack is sliced for that.
     ///
     /// # Errors
-    /// As [`GridSession::open`]; then nothing has changed.
-    pub fn set_step(&mut self, grid: impl Into<Arc<UnstructuredGrid>>) -> Result<StepChange, OpenError> {
+    /// As [`GridData::new`]; then nothing has changed.
+    pub fn set_step(&mut self, grid: impl Into<Arc<UnstructuredGrid>>) -> Result<StepChange, GridError> {
         let grid = grid.into();
         let (_, values) = choose(&grid, Some(&self.array))?;
         if is_same_shape(&grid, &self.grid) {
@@ -33,32 +33,29 @@ impl GridSession {
         let matter = Matter::new(&grid, &values)?;
         self.shape = Shape::new(matter.grid)?;
         (self.grid, self.values, self.range, self.gradients) = (grid, values, matter.range, None);
-        self.stacks = Stacks::default();
+        self.revision = Revision::new();
         Ok(StepChange::Cells)
     }
 
-    /// As [`GridSession::set_step`], with other values at the nodes of the grid that there is.
+    /// As [`GridData::set_step`], with other values at the nodes of the grid that there is.
     ///
     /// # Errors
-    /// When there is not one value per node, or as [`GridSession::open`]; then nothing has changed.
-    pub fn set_values(&mut self, values: impl Into<Samples>) -> Result<StepChange, OpenError> {
+    /// When there is not one value per node, or as [`GridData::new`]; then nothing has changed.
+    pub fn set_values(&mut self, values: impl Into<Samples>) -> Result<StepChange, GridError> {
         let values = values.into();
         let (found, expected) = (values.len(), self.grid.points().len());
         if found != expected {
-            return Err(OpenError::NumValues { found, expected });
+            return Err(GridError::NumValues { found, expected });
         }
         let start = Instant::now();
         let matter = Matter::new(&self.grid, &values)?;
-        let is_kept = is_same_shape(&matter.grid, self.shape.slicer.grid());
-        let gradients =
-            self.gradients.as_ref().filter(|_| is_kept).map(|_| node_gradients(&matter.grid, &values));
-        let is_kept = is_kept && self.stacks.set_values(&values, gradients.as_deref()).is_ok();
+        let is_kept = is_same_shape(&matter.grid, self.with_matter());
         if !is_kept {
-            // Other cells hold matter, or the values need to be told in other numbers than those that there are.
+            // Other cells hold matter.
             self.shape = Shape::new(matter.grid)?;
-            self.stacks = Stacks::default();
         }
-        (self.values, self.range, self.gradients) = (values, matter.range, gradients);
+        (self.values, self.range, self.gradients) = (values, matter.range, None);
+        self.revision = Revision::new();
         self.step_seconds += start.elapsed().as_secs_f64();
         Ok(if is_kept { StepChange::Values } else { StepChange::Cells })
     }
@@ -73,25 +70,25 @@ pub(super) struct Matter {
 }
 
 impl Matter {
-    pub(super) fn new(grid: &Arc<UnstructuredGrid>, values: &Samples) -> Result<Self, OpenError> {
+    pub(super) fn new(grid: &Arc<UnstructuredGrid>, values: &Samples) -> Result<Self, GridError> {
         let grid = without_blank_values(grid, values);
-        let range = of_used_nodes(&grid, values).range(0).ok_or(OpenError::Blank)?;
+        let range = of_used_nodes(&grid, values).range(0).ok_or(GridError::Blank)?;
         if (range[1] - range[0]).is_finite() {
             Ok(Self { grid, range })
         } else {
-            Err(OpenError::TooWide { range })
+            Err(GridError::TooWide { range })
         }
     }
 }
 
 /// The array of this name, else the first.
-pub(super) fn choose(grid: &UnstructuredGrid, name: Option<&str>) -> Result<(String, Samples), OpenError> {
+pub(super) fn choose(grid: &UnstructuredGrid, name: Option<&str>) -> Result<(String, Samples), GridError> {
     let array = match name {
         Some(name) => grid.array(name).ok_or_else(|| {
             let found = grid.arrays().iter().map(|array| array.name.clone()).collect();
-            OpenError::NoArray { name: name.to_owned(), found }
+            GridError::NoArray { name: name.to_owned(), found }
         })?,
-        None => grid.arrays().first().ok_or(OpenError::NoArrays)?,
+        None => grid.arrays().first().ok_or(GridError::NoArrays)?,
     };
     Ok((array.name.clone(), array.values.clone()))
 }

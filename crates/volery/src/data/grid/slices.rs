@@ -8,7 +8,8 @@ use volery_io::{GlbOptions, WriteError, write_glb, write_vsl};
 use volery_scene::TransferFunction;
 use volery_slicing::{CompactMesh, Planes, QuantizedMesh, error, node_gradients};
 
-use super::GridSession;
+use super::GridData;
+use crate::data::Data as _;
 use crate::transfer::Preset;
 
 /// Bytes of a corner of a polygon where nothing is shared: place, gradient and value as 32-bit numbers.
@@ -66,7 +67,7 @@ pub enum SlicesError {
     Compact(#[from] error::Compact),
 }
 
-impl GridSession {
+impl GridData {
     /// Slices by so many planes, evenly over the grid's extent along a normal of any length.
     ///
     /// # Errors
@@ -98,7 +99,12 @@ impl GridSession {
             slice_seconds,
             compact_seconds,
         };
-        Ok(Slices { compact, transfer: self.preset(Preset::Auto), distance: planes.distance(), counts })
+        Ok(Slices {
+            compact,
+            transfer: self.preset_over(Preset::Auto, None),
+            distance: planes.distance(),
+            counts,
+        })
     }
 }
 

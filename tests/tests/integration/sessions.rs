@@ -1,0 +1,5 @@
+//! Sessions of each kind of data: what stays, what a dial does, what is refused.
+
+mod grids;
+mod planes;
+mod volumes;
