@@ -4,10 +4,14 @@
 //! be a GPU: on two cores Mesa's llvmpipe took two to three times as long for the same pictures (`cargo xtask
 //! bench peers` prints both), and both use the same cores.
 
+#[cfg(feature = "wgpu")]
 use std::path::Path;
 
-use volery_frame::{Backend, DeviceKind};
+use volery_frame::Backend;
+#[cfg(feature = "wgpu")]
+use volery_frame::DeviceKind;
 use volery_software::SoftwareBackend;
+#[cfg(feature = "wgpu")]
 use volery_wgpu::WgpuBackend;
 
 /// Who shall draw.
@@ -36,7 +40,16 @@ impl BackendChoice {
 /// Why a backend could not be had.
 #[derive(Debug, thiserror::Error)]
 #[error("backend wgpu: {0}")]
-pub struct BackendError(#[from] volery_wgpu::OpenError);
+pub struct BackendError(#[from] Refused);
+
+#[cfg(feature = "wgpu")]
+type Refused = volery_wgpu::OpenError;
+
+/// What is left out of this build.
+#[cfg(not(feature = "wgpu"))]
+#[derive(Debug, thiserror::Error)]
+#[error("not in this build of the library, expected its feature wgpu")]
+struct Refused;
 
 /// Opens a backend.
 ///
@@ -45,17 +58,42 @@ pub struct BackendError(#[from] volery_wgpu::OpenError);
 pub fn open_backend(choice: BackendChoice) -> Result<Box<dyn Backend>, BackendError> {
     match choice {
         BackendChoice::Software => Ok(Box::new(SoftwareBackend::new())),
-        BackendChoice::Wgpu => Ok(Box::new(WgpuBackend::new()?)),
-        BackendChoice::Auto => Ok(match may_have_gpu().then(|| WgpuBackend::of_kind(DeviceKind::Gpu)) {
-            Some(Ok(gpu)) => Box::new(gpu),
-            _ => Box::new(SoftwareBackend::new()),
-        }),
+        BackendChoice::Wgpu => Ok(of_wgpu()?),
+        BackendChoice::Auto => Ok(gpu().unwrap_or_else(|| Box::new(SoftwareBackend::new()))),
     }
+}
+
+#[cfg(feature = "wgpu")]
+fn of_wgpu() -> Result<Box<dyn Backend>, Refused> {
+    Ok(Box::new(WgpuBackend::new()?))
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn of_wgpu() -> Result<Box<dyn Backend>, Refused> {
+    Err(Refused)
+}
+
+/// A real GPU, if there is one that opens.
+#[cfg(feature = "wgpu")]
+fn gpu() -> Option<Box<dyn Backend>> {
+    let gpu = may_have_gpu().then(|| WgpuBackend::of_kind(DeviceKind::Gpu).ok()).flatten()?;
+    Some(Box::new(gpu))
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn gpu() -> Option<Box<dyn Backend>> {
+    None
 }
 
 /// Whether it is worth looking for a GPU. On Linux each kind of driver has a file of its own; without any of
 /// them, loading Vulkan to find nothing takes longer than a small picture.
+#[cfg(feature = "wgpu")]
 fn may_have_gpu() -> bool {
     const DRIVER_FILES: [&str; 5] = ["/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/kgsl-3d0", "/dev/mali0"];
     !cfg!(target_os = "linux") || DRIVER_FILES.iter().any(|file| Path::new(file).exists())
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn may_have_gpu() -> bool {
+    false
 }

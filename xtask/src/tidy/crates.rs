@@ -110,7 +110,8 @@ fn array(value: &Value) -> Result<&[Value], String> {
     value.as_array().map(Vec::as_slice).ok_or_else(|| format!("cargo metadata: {value}, expected an array"))
 }
 
-/// Every package is in the graph, where it says; every use outside tests is an arrow of it.
+/// Every package is in the graph, where it says; every use outside tests is an arrow of it, and no test uses a crate
+/// that is built on the one that it tests: neither could be packaged first.
 fn arrows(metadata: &Value) -> Result<Vec<Finding>, String> {
     let members = members(metadata)?;
     let names: BTreeSet<&str> = members.iter().map(|(name, _, _)| name.as_str()).collect();
@@ -129,9 +130,19 @@ fn arrows(metadata: &Value) -> Result<Vec<Finding>, String> {
                     format!("{name} uses {used}, expected only {:?} of the workspace", rule.may_use);
                 findings.push(Finding::new(&manifest, 0, message));
             }
+            if is_for_tests && reaches(used, name) {
+                let message = format!("tests of {name} use {used}, which uses {name}, expected no circle");
+                findings.push(Finding::new(&manifest, 0, message));
+            }
         }
     }
     Ok(findings)
+}
+
+/// Whether a package of the graph uses another, by whatever way.
+fn reaches(from: &str, to: &str) -> bool {
+    let rule = GRAPH.iter().find(|rule| rule.package == from);
+    rule.is_some_and(|rule| rule.may_use.iter().any(|&used| used == to || reaches(used, to)))
 }
 
 /// No algorithm crate reaches a device or a file through any of its dependencies, tests aside.
@@ -251,6 +262,7 @@ mod tests {
         assert_eq!(found(&world("volery-octree", "crates/octree", "volery-io", None)), 1);
         assert_eq!(found(&world("volery-octree", "crates/octree", "volery-io", Some("build"))), 1);
         assert_eq!(found(&world("volery-octree", "crates/octree", "volery-io", Some("dev"))), 0);
+        assert_eq!(found(&world("volery-slicing", "crates/slicing", "volery-io", Some("dev"))), 1);
         assert_eq!(found(&world("volery", "crates/volery", "volery-io", None)), 0);
         assert_eq!(found(&world("volery-new", "crates/new", "between", None)), 1);
         assert_eq!(found(&world("volery-octree", "crates/tree", "between", None)), 1);
