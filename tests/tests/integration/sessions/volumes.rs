@@ -7,9 +7,9 @@ use volery_tests::Drawer;
 use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::{
-    Backend, BackendChoice, ControlPoint, Device, DeviceKind, Dial, How, Image, Preset, RenderError,
-    SampleType, Thickness, TransferFunction, View, ViewOptions, VolumeData, VolumeError, VoxelGrid,
-    open_backend,
+    Backend, BackendChoice, ControlPoint, Device, DeviceKind, Dial, How, Image, PlaneView, Preset,
+    RenderError, SampleType, Session, Thickness, TransferFunction, View, ViewOptions, VolumeData,
+    VolumeError, VoxelGrid, open_backend,
 };
 use volery_frame::{Brick, BrickId, DrawError, Drawn, Frame, Revision, UploadError, VolumeLayout};
 
@@ -290,4 +290,61 @@ fn refinements_come_coarse_first_and_end_with_the_picture_itself() {
             assert_eq!(steps.len() > 1, dial != Dial::Tolerance(0.9), "{how:?} {dial:?}: {nodes:?}");
         }
     }
+}
+
+/// Each of 20 pictures of one session, by whatever technique and dial, is that of a new one; so is that of another
+/// session in between, by the same backend.
+#[test]
+fn one_session_changes_technique_and_dial_as_if_it_were_new() {
+    let [grid, other] = [volery_data::marschner_lobb(50), volery_data::noise([40, 36, 44], 7)];
+    let mut session = session_of(grid.clone());
+    let mut between = Session::new(VolumeData::new(other.clone()).unwrap());
+    let hows = [How::Raycast, How::Planes(PlaneView::default()), How::Fans(Thickness::Exact)];
+    let narrow = |value, opacity| ControlPoint { value, color: [0.9, 0.4, 0.2], opacity };
+    let mut builds = Vec::new();
+    for number in 0..20 {
+        let how = hows[number % 3].clone();
+        let dial = match (number % 4, &how) {
+            (0, _) => Dial::Full,
+            (3, How::Planes(_)) => Dial::Error(0.1),
+            (tenths, _) => Dial::Tolerance(0.1 * tenths as f64),
+        };
+        // Now and then one for which samples are stored in another way.
+        let points = vec![narrow(0.5, 0.0), narrow(if number % 5 == 2 { 0.505 } else { 0.9 }, 0.3)];
+        let transfer = Some(TransferFunction::new(points, 0.1).unwrap().into());
+        let view = session.view(&ViewOptions { how: Some(how), transfer, ..small() });
+        let view = View { dial, ..view };
+        let found = session.render(&view).unwrap();
+        let fresh = session_of(grid.clone()).render(&view).unwrap();
+        assert!(found.image == fresh.image, "{number}: {:?}, {dial:?}", view.how);
+        builds.push(found.report.seconds.build);
+        if number % 6 == 5 {
+            let view = between.view(&small());
+            let found = between.render(&view, session.backend.as_mut()).unwrap();
+            assert!(
+                found.image == session_of(other.clone()).render(&view).unwrap().image,
+                "{number}: between"
+            );
+        }
+    }
+    // Of one technique it is always the same: nothing is built again.
+    for (number, build) in builds.iter().enumerate().skip(3) {
+        assert_eq!(*build, builds[number - 3], "{number}");
+    }
+}
+
+#[test]
+fn what_a_technique_does_not_obey_is_refused() {
+    let mut session = session_of(volery_data::marschner_lobb(12));
+    let view = session.view(&small());
+    let mut fails = |how: How, dial: Dial| {
+        let error = session.render(&View { how, dial, ..view.clone() }).err().unwrap();
+        println!("{error}");
+        error
+    };
+    let dial = Dial::Error(0.1);
+    assert!(matches!(fails(How::Raycast, dial), RenderError::Dial { technique: "raycast", .. }));
+    assert!(matches!(fails(How::Fans(Thickness::Exact), dial), RenderError::Dial { technique: "fans", .. }));
+    let stack = How::Stack(volery::StackView::default());
+    assert!(matches!(fails(stack, Dial::Full), RenderError::OtherData { found: "volume", .. }));
 }
