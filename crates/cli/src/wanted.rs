@@ -152,6 +152,7 @@ pub(crate) fn view(
     session: &dyn Drawn,
 ) -> Result<View, Failure> {
     check_applies(args, wanted, input, session)?;
+    let range = wanted.range.or_else(|| window(args, wanted, input, session));
     let mut stack = stack_view(wanted);
     let transfer = match load_transfer(args, wanted, session)? {
         None => None,
@@ -162,7 +163,7 @@ pub(crate) fn view(
         }
         Some(SceneTransfer::Preset(name)) => {
             let preset = Preset::from_name(&name).ok_or_else(|| unknown_preset(&name))?;
-            Some(session.preset(preset, wanted.range))
+            Some(session.preset(preset, range))
         }
     };
     let defaults = ViewOptions::default();
@@ -173,7 +174,7 @@ pub(crate) fn view(
         direction: args.view,
         orthographic: args.orthographic,
         transfer,
-        range: wanted.range,
+        range,
         planes: plane_view(wanted),
         stack,
     };
@@ -189,6 +190,28 @@ pub(crate) fn view(
     };
     view.meshes = input.meshes.clone();
     Ok(view)
+}
+
+/// The values that the file asks to show, where nothing else says over which ones automatic colours run, and the data
+/// have some of them.
+pub(crate) fn window(
+    args: &RenderArgs,
+    wanted: &SceneFile,
+    input: &Input,
+    session: &dyn Drawn,
+) -> Option<[f64; 2]> {
+    let is_automatic = match (&args.transfer, &wanted.transfer) {
+        (Some(Transfer::File(_)), _) => false,
+        (_, None) => true,
+        (_, Some(SceneTransfer::Preset(name))) => Preset::from_name(name).is_some_and(Preset::is_automatic),
+        (_, Some(_)) => false,
+    };
+    if wanted.range.is_some() || session.has_colors() || !is_automatic {
+        return None;
+    }
+    let [lowest, highest] = session.value_range();
+    let [low, high] = input.volume().ok()?.display_range?;
+    (low < high && low <= highest && lowest <= high).then_some([low, high])
 }
 
 /// Refuses options that the data, or the transfer function, have no use for.

@@ -18,12 +18,12 @@ use volery_reference::GridTracer;
 use volery_scene::{CellType, Samples, TransferFunction, UnstructuredGrid};
 use volery_slicing::{Slicer, node_gradients};
 
-use crate::report;
 use crate::session::{Picture, RenderError, VerifyError, View, ViewOptions};
 #[cfg(doc)]
 use crate::technique::stack::Slicing;
 use crate::technique::stack::{self, Frames, Tabulated};
 use crate::transfer::Preset;
+use crate::{fit, histogram, report};
 
 pub use error::OpenError;
 pub use slices::{SliceCounts, Slices, SlicesError};
@@ -110,13 +110,17 @@ impl GridSession {
         self.shape.world_bounds[1] - self.shape.world_bounds[0]
     }
 
-    /// A view of the whole grid: the camera as near as it can be, the transfer function [`Preset::Auto`] where
-    /// [`ViewOptions`] has none.
+    /// A view of all that can be seen of the grid: the camera as near as it can be, the transfer function
+    /// [`Preset::Auto`] where [`ViewOptions`] has none.
     pub fn view(&self, options: &ViewOptions) -> View {
-        stack::view(self.shape.world_bounds, options, || self.preset_over(Preset::Auto, options.range))
+        let boxes = |transfer: &TransferFunction| match &options.stack.classification {
+            Some(_) => vec![self.shape.world_bounds],
+            None => fit::visible_cells(self.shape.slicer.grid(), &self.values, transfer),
+        };
+        stack::view(options, || self.preset_over(Preset::Auto, options.range), boxes)
     }
 
-    /// The transfer function of a preset for this grid, from the values at the nodes of cells that hold matter.
+    /// The transfer function of a preset for this grid, from the values in cells that hold matter, by their volume.
     pub fn preset(&self, preset: Preset) -> TransferFunction {
         self.preset_over(preset, None)
     }
@@ -126,8 +130,8 @@ impl GridSession {
     /// # Panics
     /// Never: opening found finite values and their range.
     pub fn preset_over(&self, preset: Preset, range: Option<[f64; 2]>) -> TransferFunction {
-        let used = values::of_used_nodes(self.shape.slicer.grid(), &self.values);
-        let transfer = preset.over(&used, range, self.extent());
+        let samples = histogram::by_volume(self.shape.slicer.grid(), &self.values);
+        let transfer = preset.over(&samples, range, self.extent());
         transfer.expect("opening found finite values and their range")
     }
 
@@ -166,6 +170,7 @@ impl GridSession {
             dims: None,
             cells: Some(cells.collect()),
             scalar: self.values.sample_type().name(),
+            place: None,
         };
         let resident = self.stacks.num_bytes();
         frames.picture(view, input, (self.backend.device(), resident), self.shape.build_seconds)

@@ -70,7 +70,8 @@ impl StackSession {
     pub fn view(&self, options: &ViewOptions) -> View {
         let direction = options.direction.unwrap_or_else(|| Direction::facing(self.stack.normal()));
         let options = ViewOptions { direction: Some(direction), ..options.clone() };
-        stack::view(self.world_bounds, &options, || self.preset_over(Preset::Auto, options.range))
+        let transfer = || self.preset_over(Preset::Auto, options.range);
+        stack::view(&options, transfer, |_| vec![self.world_bounds])
     }
 
     /// The transfer function of a preset, from the values at the vertices.
@@ -99,7 +100,8 @@ impl StackSession {
         for _ in 0..num_frames {
             frames.draw(&mut self.stack, &mut self.table, (view, self.range), self.backend.as_mut(), None)?;
         }
-        let input = report::Input { path: None, kind: "stack", dims: None, cells: None, scalar: "u16" };
+        let input =
+            report::Input { path: None, kind: "stack", dims: None, cells: None, scalar: "u16", place: None };
         frames.picture(view, input, (self.backend.device(), self.stack.num_bytes()), self.build_seconds)
     }
 }

@@ -6,14 +6,14 @@ use volery::info::number;
 use volery::io::scene_file::SceneTechnique;
 use volery::io::write_atomically;
 use volery::output::{ErrorMap, write_image};
-use volery::report::InputFile;
+use volery::report::{InputFile, Place};
 use volery::{Input, Picture, Report, VerifyError, View, reference};
 
 use super::{Run, empty};
 use crate::args::numbered;
 use crate::drawn::Drawn;
 use crate::progress::Progress;
-use crate::{Failure, save, say};
+use crate::{Failure, save, say, wanted};
 
 /// What a stage of a picture may add to its error without a word.
 const MAX_STAGE_ERROR: f64 = 0.01;
@@ -83,6 +83,12 @@ pub(super) fn finish(
         save::save_scene(path, wanted, (view, technique), session.has_colors())?;
     }
     notes(input.notes(), session, view)?;
+    if let Some([low, high]) = wanted::window(args, wanted, input, session) {
+        let [low, high] = [low, high].map(number);
+        say(format_args!(
+            "note: colours run over the values that the file asks to show, {low} to {high} (--range for others)"
+        ))?;
+    }
     match empty::reason(&picture.image, view, input) {
         None => Ok(()),
         Some(reason) => say(format_args!("note: nothing is seen: {reason}")),
@@ -92,6 +98,7 @@ pub(super) fn finish(
 /// Says in a report what was read.
 pub(super) fn name_sources(report: &mut Report, input: &Input) {
     report.input.path = Some(input.path.to_string_lossy().into_owned());
+    report.input.place = input.volume().ok().and_then(Place::of);
     report.inputs = input.files.iter().map(InputFile::from).collect();
     report.seconds.load = Some(input.load_seconds);
 }

@@ -37,6 +37,7 @@ impl Session {
                 dims: Some(dims),
                 cells: None,
                 scalar: self.grid.sample_type().name(),
+                place: None,
             },
             technique: self.technique.name(),
             thickness: matches!(plan, Plan::Cubes(_)).then(|| view.thickness.name()),

@@ -308,17 +308,18 @@ fn quantized_vertices(mesh: &QuantizedMesh) -> SheetVertices<'_> {
 
 /// A view of all of a box.
 pub(crate) fn view(
-    world_bounds: [DVec3; 2],
     options: &ViewOptions,
     transfer: impl FnOnce() -> TransferFunction,
+    boxes: impl FnOnce(&TransferFunction) -> Vec<[DVec3; 2]>,
 ) -> View {
     let &ViewOptions { width, height, direction, orthographic, .. } = options;
     let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
+    let transfer = options.transfer.clone().unwrap_or_else(transfer);
     View {
         width,
         height,
-        camera: fit::camera(&[world_bounds], direction.unwrap_or_default(), orthographic, aspect),
-        transfer: options.transfer.clone().unwrap_or_else(transfer),
+        camera: fit::camera(&boxes(&transfer), direction.unwrap_or_default(), orthographic, aspect),
+        transfer,
         background: BACKGROUND,
         tolerance: None,
         planes: PlaneView::default(),
