@@ -18,7 +18,7 @@ mod series;
 mod slice;
 mod stack;
 
-pub(crate) use file::FileArgs;
+pub(crate) use file::{ChoiceArgs, FileArgs};
 pub(crate) use series::numbered;
 pub(crate) use slice::SliceArgs;
 pub(crate) use stack::StackArgs;

@@ -9,10 +9,11 @@ use crate::{Failure, say};
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let busy = Progress::spinner("reading");
     let options = InputOptions { data_dir: args.data.clone(), input: args.file.of_scene() };
-    let input = options.find(&args.input)?.read()?;
+    let plan = options.find(&args.input)?;
+    let input = plan.read()?;
     let text = match input.data {
         InputData::Grid(file) => {
-            let info = GridInfo::of(&input.path, file)?;
+            let info = GridInfo::of(&input.path, file, &plan.input.grid_options())?;
             if args.json { serde_json::to_string_pretty(&info)? } else { info.to_string() }
         }
         InputData::Stack(mesh) => {

@@ -44,6 +44,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if !args.stack.time_steps.is_empty() && file.is_file() && !is_grid(file) {
         return Err(Failure::of_file(file, "is no unstructured grid, expected one for --time-steps"));
     }
+    if !args.stack.time_steps.is_empty() && plan.input.time_step.is_some() {
+        let problem = "time_step is of one picture, expected a scene without it for --time-steps";
+        return Err(Failure::of_file(&args.input, problem));
+    }
     let steps = grid::steps(&args.stack.time_steps)?;
     let outputs = outputs(args, steps.len());
     let transfer = match &args.transfer {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use volery::io::{GlbOptions, GridOptions, read_grid, recording_files};
 use volery::{GridData, SliceCounts};
 
-use crate::args::SliceArgs;
+use crate::args::{ChoiceArgs, SliceArgs};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use crate::{Failure, extent, say};
@@ -15,12 +15,13 @@ pub(crate) fn run(args: &SliceArgs) -> Result<(), Failure> {
     let outputs = Outputs::default().file("-o", &args.output);
     outputs.check([args.input.as_path()])?;
     let busy = Progress::spinner("slicing");
-    let options = GridOptions { array: args.array.clone(), ..GridOptions::default() };
+    let ChoiceArgs { array, channel, time_step } = args.choice.clone();
+    let options = GridOptions { array: array.clone(), channel, time_step, ..GridOptions::default() };
     let (file, opened) = recording_files(|| read_grid(&args.input, &options));
     let file = file?;
     outputs.check_inputs(opened.iter().map(|file| file.path.as_path()))?;
     extent::check(&args.input, &file.grid, args.count as usize, Some(args.axis))?;
-    let opened = GridData::new(file.grid, args.array.as_deref());
+    let opened = GridData::new(file.grid, array.as_deref());
     let grid = opened.map_err(|error| Failure::of_file(&args.input, error))?;
     let sliced = grid.slices(args.axis, args.count as usize);
     let slices = sliced.map_err(|error| Failure::of_file(&args.input, error))?;

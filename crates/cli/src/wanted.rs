@@ -179,6 +179,7 @@ pub(crate) fn view<D: Data>(
     mut how: How,
 ) -> Result<View, Failure> {
     check_applies(args, wanted, input, session)?;
+    let range = wanted.range.or_else(|| window(args, wanted, input, session));
     let transfer = match load_transfer(args, wanted, session)? {
         None => None,
         Some(SceneTransfer::Values(function)) => Some(function.into()),
@@ -190,7 +191,7 @@ pub(crate) fn view<D: Data>(
         }
         Some(SceneTransfer::Preset(name)) => {
             let preset = Preset::from_name(&name).ok_or_else(|| unknown_preset(&name))?;
-            Some(session.data().preset_over(preset, wanted.range).into())
+            Some(session.data().preset_over(preset, range).into())
         }
     };
     let defaults = ViewOptions::default();
@@ -201,7 +202,7 @@ pub(crate) fn view<D: Data>(
         direction: args.view,
         orthographic: args.orthographic,
         transfer,
-        range: wanted.range,
+        range,
         how: Some(how),
     };
     let mut view = session.view(&options);
@@ -216,6 +217,28 @@ pub(crate) fn view<D: Data>(
     };
     view.meshes = input.meshes.clone();
     Ok(view)
+}
+
+/// The values that the file asks to show, where nothing else says over which ones automatic colours run, and the data
+/// have some of them.
+pub(crate) fn window<D: Data>(
+    args: &RenderArgs,
+    wanted: &SceneFile,
+    input: &Input,
+    session: &Session<D>,
+) -> Option<[f64; 2]> {
+    let is_automatic = match (&args.transfer, &wanted.transfer) {
+        (Some(Transfer::File(_)), _) => false,
+        (_, None) => true,
+        (_, Some(SceneTransfer::Preset(name))) => Preset::from_name(name).is_some_and(Preset::is_automatic),
+        (_, Some(_)) => false,
+    };
+    if wanted.range.is_some() || session.data().has_colors() || !is_automatic {
+        return None;
+    }
+    let [lowest, highest] = session.value_range();
+    let [low, high] = input.volume().ok()?.display_range?;
+    (low < high && low <= highest && lowest <= high).then_some([low, high])
 }
 
 /// Refuses options that the data, or the transfer function, have no use for.

@@ -4,7 +4,7 @@ mod common;
 
 use std::collections::BTreeSet;
 
-use common::{Workshop, head, legacy_grid, scene_json};
+use common::{Workshop, collection, head, legacy_grid, legacy_vectors, scene_json, text_nrrd, vector};
 use serde_json::{Value, json};
 
 fn workshop() -> Workshop {
@@ -13,6 +13,11 @@ fn workshop() -> Workshop {
     std::fs::create_dir_all(shop.path("saved/here")).expect("a saved scene that is whole");
     shop.write_volume("data/head.nrrd", &head());
     shop.write("data/cells.vtk", legacy_grid(1.0, usize::MAX));
+    shop.write("flow.vtk", legacy_vectors());
+    shop.write("late.vtk", legacy_grid(3.0, usize::MAX));
+    shop.write("steps.pvd", collection(&["data/cells.vtk", "late.vtk"]));
+    shop.write("vectors.nrrd", text_nrrd("3 6 6 6", "vector domain domain domain", vector));
+    shop.write("times.nrrd", text_nrrd("6 6 6 3", "domain domain domain time", |i| vector(i) * vector(i)));
     shop.write("data/samples.bin", (0..=255).cycle().take(12 * 10 * 9 * 2).collect::<Vec<u8>>());
     shop.write("hull.obj", "v 5 5 5\nv 30 5 5\nv 5 30 9\nf 1 2 3\n");
     let mut scene = scene_json("waves.nrrd");
@@ -31,7 +36,7 @@ fn workshop() -> Workshop {
     shop
 }
 
-const LINES: [&str; 24] = [
+const LINES: [&str; 28] = [
     "waves.nrrd",
     "waves.nrrd --size 31x47 --view 200,-30,1.7",
     "waves.nrrd --orthographic --transfer viridis",
@@ -56,6 +61,10 @@ const LINES: [&str; 24] = [
     "data/cells.vtk --transfer edges.json",
     "data/cells.vsl",
     "data/cells.vsl --shade --range 0.5,2",
+    "vectors.nrrd --channel 1",
+    "times.nrrd --volume 2",
+    "flow.vtk --array flow --component 2",
+    "steps.pvd --time-step 1",
 ];
 
 #[test]

@@ -28,6 +28,11 @@ fn options(shop: &Workshop, command: &str) -> Vec<Opt> {
         if !line.starts_with(' ') && line.ends_with(':') {
             heading = line.trim_end_matches(':').to_owned();
         }
+        if let Some((_, alias)) = line.split_once("[aliases: ") {
+            let option: &Opt = options.last().expect("an alias of an option");
+            let name = alias.split(']').next().expect("the name of an alias").to_owned();
+            options.push(Opt { name, ..option.clone() });
+        }
         let Some(start) = line.find("--").filter(|&start| start <= 6) else { continue };
         let mut words = line[start..].split_whitespace();
         let name = words.next().expect("an option with a name").to_owned();
@@ -172,6 +177,7 @@ fn what_a_file_cannot_answer_is_refused() {
     volery::io::write_png(&shop.path("image.png"), 5, 4, &[[0.5, 0.2, 0.1]; 20])
         .expect("an option with a name");
     shop.write("t.json", common::scene_json("x")["transfer_function"].to_string());
+    shop.write("step.json", r#"{"input": {"file": "ring.vtk", "time_step": 0}}"#);
     for (file, option) in [
         // B5: --array on files without arrays.
         ("v_5x4x3_uint8.raw", "--array nosuch"),
@@ -186,6 +192,19 @@ fn what_a_file_cannot_answer_is_refused() {
         ("waves.nrrd", "--dims 4,4,4"),
         ("waves.nrrd", "--dtype float32"),
         ("v_5x4x3_uint8.raw", "--dims 4,4,4"),
+        // Raw files and stacks know one of each; others are asked for one that they have not.
+        ("v_5x4x3_uint8.raw", "--channel 0"),
+        ("v_5x4x3_uint8.raw", "--component 1"),
+        ("v_5x4x3_uint8.raw", "--time-step 0"),
+        ("v_5x4x3_uint8.raw", "--volume 1"),
+        ("ring.vsl", "--channel 0"),
+        ("ring.vsl", "--time-step 0"),
+        ("waves.nrrd", "--channel 1"),
+        ("waves.nrrd", "--time-step 1"),
+        ("image.png", "--channel 3"),
+        ("image.png", "--time-step 1"),
+        ("ring.vtk", "--channel 1"),
+        ("ring.vtk", "--time-step 1"),
     ] {
         for command in ["render -o new.png --size 8x8", "info"] {
             let (command, rest) = command.split_once(' ').unwrap_or((command, ""));
@@ -204,11 +223,15 @@ fn what_a_file_cannot_answer_is_refused() {
         ("ring.vtk --focus 1,2,3", &["ring.vtk", "--focus"]),
         ("ring.vtk --nearest", &["ring.vtk", "--nearest"]),
         ("waves.nrrd --shade", &["waves.nrrd", "--shade"]),
+        ("waves.nrrd --channel 0 --component 0", &["--channel", "cannot be used multiple times"]),
+        ("ring.vtk --time-steps ring.vtk --volume 0", &["--time-step", "--time-steps", "cannot be used"]),
     ] {
         let outcome = shop.run_line(&format!("render {line} -o new.png --size 8x8"));
         outcome.fails(outcome.code.expect("an option with a name"), words);
     }
-    assert!(!shop.names().contains(&"new.png".to_owned()));
+    let outcome = shop.run_line("render step.json --time-steps ring.vtk -o new-%d.png --size 8x8");
+    outcome.fails(1, &["step.json", "time_step", "--time-steps"]);
+    assert!(!shop.names().iter().any(|name| name.starts_with("new")));
 }
 
 #[test]

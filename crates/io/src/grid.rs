@@ -6,7 +6,7 @@
 //! corner nodes; every other cell, copies of cells in other pieces and hidden cells are counted in the notes.
 //! Points that pieces share become one, so that the grid hangs together where it was cut into pieces.
 //! Values on cells are averaged to the nodes, the mean of the cells around; an array of several components
-//! becomes its magnitude.
+//! becomes its magnitude, or the one of them that is asked for.
 
 use std::fmt;
 use std::io::Read;
@@ -16,6 +16,7 @@ use glam::DVec3;
 use volery_scene::UnstructuredGrid;
 
 use crate::bytes::{self, load};
+use crate::choice::{Choices, checked_step, first_note};
 use crate::error::{Problem, ReadError, quoted};
 use crate::volume::{is_vtk_xml, lower_name};
 use crate::vtk_xml::XmlBytes;
@@ -36,6 +37,8 @@ pub struct GridOptions {
     /// The array to read; else the active scalars, else the first scalar, points before cells, that is not the same
     /// everywhere.
     pub array: Option<String>,
+    /// The component to read, from 0, where a value has several; else their magnitude.
+    pub channel: Option<usize>,
     /// Which of the time steps of an Exodus file or a collection to read, from 0; else the first.
     pub time_step: Option<usize>,
     /// Limit of the grid in memory, in bytes.
@@ -45,7 +48,7 @@ pub struct GridOptions {
 impl Default for GridOptions {
     /// The file's own array, at most 64 GiB.
     fn default() -> Self {
-        Self { array: None, time_step: None, max_bytes: 64 << 30 }
+        Self { array: None, channel: None, time_step: None, max_bytes: 64 << 30 }
     }
 }
 
@@ -117,6 +120,8 @@ pub struct GridFile {
     pub format: GridFormat,
     /// The array that was read; `None` where the file has none.
     pub array: Option<GridArray>,
+    /// What the file has of which this is one; the channels are those of the array.
+    pub choices: Choices,
     /// What the reader decided for the user, a sentence each: cells left out, values averaged, and the like.
     pub notes: Vec<String>,
 }
@@ -126,8 +131,9 @@ pub struct GridFile {
 pub struct ArrayRange {
     /// The array.
     pub array: GridArray,
-    /// Smallest and largest finite value, of the magnitude where there are several components; `None` if there
-    /// is none.
+    /// Which of several components the range is of; `None` for their magnitude, or where there is one.
+    pub channel: Option<usize>,
+    /// Smallest and largest finite value; `None` if there is none.
     pub range: Option<[f64; 2]>,
     /// Values that are NaN or infinite.
     pub blank: u64,
@@ -150,12 +156,14 @@ pub fn is_grid(path: &Path) -> bool {
 /// When the file cannot be read, is damaged, is larger than `options` allow, has no cell of volume, or is of a
 /// kind that is not supported: one line that says what was found and what was expected.
 pub fn read_grid(path: &Path, options: &GridOptions) -> Result<GridFile, ReadError> {
-    with_parts(path, options.time_step, |format, parts| {
-        let (grid, array, mut notes) = join::join(parts, options)?;
-        if format == GridFormat::Pvd && options.time_step.is_none() {
-            notes.push("of a series of time steps the first is read".to_owned());
+    with_parts(path, options.time_step, |format, time_steps, parts| {
+        let mut file = join::join(format, parts, options)?;
+        // Of an Exodus file its reader says the same.
+        if format == GridFormat::Pvd {
+            file.notes.extend(first_note("time steps", time_steps, options.time_step));
         }
-        Ok(GridFile { grid, format, array, notes })
+        file.choices.time_steps = time_steps;
+        Ok(file)
     })
 }
 
@@ -164,7 +172,7 @@ pub fn read_grid(path: &Path, options: &GridOptions) -> Result<GridFile, ReadErr
 /// # Errors
 /// As [`read_grid`], cells and values aside.
 pub fn read_array_ranges(path: &Path, options: &GridOptions) -> Result<Vec<ArrayRange>, ReadError> {
-    with_parts(path, options.time_step, |_, parts| join::ranges(parts, options))
+    with_parts(path, options.time_step, |_, _, parts| join::ranges(parts, options))
 }
 
 /// A grid, or a part of one, whose numbers have not been read yet.
@@ -260,15 +268,15 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Opens a file and runs something on its parts.
+/// Opens a file and runs something on its parts, told how many time steps there are.
 fn with_parts<R>(
     path: &Path,
     time_step: Option<usize>,
-    run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
+    run: impl FnOnce(GridFormat, u64, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, ReadError> {
     let read = match format_of(path) {
         Ok(GridFormat::Pvd) => {
-            pvd::with_step(path, time_step.unwrap_or(0), |parts| run(GridFormat::Pvd, parts))
+            pvd::with_step(path, time_step, |time_steps, parts| run(GridFormat::Pvd, time_steps, parts))
         }
         Ok(format) => with_parts_of(path, format, time_step, run),
         Err(problem) => Err(problem),
@@ -281,16 +289,19 @@ fn with_parts_of<R>(
     path: &Path,
     format: GridFormat,
     time_step: Option<usize>,
-    run: impl FnOnce(GridFormat, &[Part]) -> Result<R, Problem>,
+    run: impl FnOnce(GridFormat, u64, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
-    if let Some(step) = time_step.filter(|&step| step > 0 && format != GridFormat::Exodus) {
-        return Err(Problem::field("time step asked for", step, "0: the file holds one"));
+    if format != GridFormat::Exodus {
+        checked_step(1, time_step)?;
     }
     match format {
-        GridFormat::Vtu => vtu::with_parts(&XmlBytes::new(load(path)?)?, |parts| run(format, parts)),
-        GridFormat::Pvtu => pvtu::with_parts(path, |parts| run(format, parts)),
-        GridFormat::LegacyVtk => legacy::with_parts(&load(path)?, |parts| run(format, parts)),
-        GridFormat::Exodus => exodus::with_parts(&load(path)?, time_step, |parts| run(format, parts)),
+        GridFormat::Vtu => vtu::with_parts(&XmlBytes::new(load(path)?)?, |parts| run(format, 1, parts)),
+        GridFormat::Pvtu => pvtu::with_parts(path, |parts| run(format, 1, parts)),
+        GridFormat::LegacyVtk => legacy::with_parts(&load(path)?, |parts| run(format, 1, parts)),
+        GridFormat::Exodus => {
+            let run = |time_steps, parts: &[Part]| run(format, time_steps, parts);
+            exodus::with_parts(&load(path)?, time_step, run)
+        }
         GridFormat::Pvd => Err(Problem::field("file", "a collection", "a grid of one time")),
     }
 }

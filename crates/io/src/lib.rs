@@ -29,6 +29,7 @@
 //! Materials of meshes; polyhedra and cells without volume; netCDF-4; DICOM; colours of palettes.
 
 mod bytes;
+mod choice;
 mod error;
 pub mod grid;
 mod layout;
@@ -45,6 +46,7 @@ mod volume;
 mod vtk_xml;
 
 pub use bytes::{OpenedFile, recording_files};
+pub use choice::Choices;
 pub use error::{Problem, ReadError};
 pub use grid::{GridFile, GridOptions, is_grid, read_grid};
 pub use layout::{ByteOrder, Element, ParseElementError};

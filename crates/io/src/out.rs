@@ -5,10 +5,12 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use exr::prelude::{Encoding, Image, SpecificChannels, WritableImage};
+use glam::{DAffine3, DMat3, DVec3};
 use volery_scene::{SampleType, Samples, VoxelGrid, for_samples};
 
 use crate::error::ReadError;
 use crate::layout::ByteOrder;
+use crate::orientation::World;
 use crate::volume::read_png;
 
 mod whole;
@@ -94,11 +96,12 @@ pub fn read_png_rgb(path: &Path) -> Result<Picture, ReadError> {
     Ok(Picture { width: page.width, height: page.height, pixels })
 }
 
-/// Writes a volume as NRRD, uncompressed, in the machine's byte order.
+/// Writes a volume as NRRD, uncompressed, in the machine's byte order, with the place of its samples in a world of this
+/// kind. Where that is more than their distances, the lengths of the axes in the world stand for these.
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_nrrd(path: &Path, grid: &VoxelGrid) -> Result<(), WriteError> {
+pub fn write_nrrd(path: &Path, grid: &VoxelGrid, world: World) -> Result<(), WriteError> {
     write_atomically(path, |file| {
         let (name, color) = match grid.sample_type() {
             SampleType::U8 => ("uint8", None),
@@ -114,16 +117,39 @@ pub fn write_nrrd(path: &Path, grid: &VoxelGrid) -> Result<(), WriteError> {
         };
         let (channels, kind) = color.and_then(|color| color.split_once(' ')).unwrap_or_default();
         let pad = |text: &str| if text.is_empty() { String::new() } else { format!("{text} ") };
-        let ([x, y, z], spacing) = (grid.dims(), grid.spacing());
+        let [x, y, z] = grid.dims();
         writeln!(file, "NRRD0004\ntype: {name}\ndimension: {}", if color.is_some() { 4 } else { 3 })?;
         writeln!(file, "sizes: {}{x} {y} {z}", pad(channels))?;
-        let no_spacing = if color.is_some() { "nan " } else { "" };
-        writeln!(file, "spacings: {no_spacing}{} {} {}", spacing.x, spacing.y, spacing.z)?;
+        write_place(file, grid, world, color.is_some())?;
         writeln!(file, "kinds: {}domain domain domain", pad(kind))?;
         let order = if ByteOrder::NATIVE == ByteOrder::Little { "little" } else { "big" };
         writeln!(file, "endian: {order}\nencoding: raw\n")?;
         write_samples(file, grid.samples())
     })
+}
+
+/// Distances of samples, or where they say too little, directions and origin.
+fn write_place(
+    file: &mut BufWriter<File>,
+    grid: &VoxelGrid,
+    world: World,
+    has_channels: bool,
+) -> io::Result<()> {
+    let (spacing, world_from_index) = (grid.spacing(), grid.world_from_index());
+    if world == World::Plain && world_from_index == DAffine3::from_scale(spacing) {
+        let of_channels = if has_channels { "nan " } else { "" };
+        return writeln!(file, "spacings: {of_channels}{} {} {}", spacing.x, spacing.y, spacing.z);
+    }
+    match world {
+        World::Anatomical => writeln!(file, "space: right-anterior-superior")?,
+        World::Plain => writeln!(file, "space dimension: 3")?,
+    }
+    let vector = |DVec3 { x, y, z }: DVec3| format!("({x},{y},{z})");
+    let DMat3 { x_axis, y_axis, z_axis } = world_from_index.matrix3;
+    let of_channels = if has_channels { "none " } else { "" };
+    let axes = [x_axis, y_axis, z_axis].map(vector).join(" ");
+    writeln!(file, "space directions: {of_channels}{axes}")?;
+    writeln!(file, "space origin: {}", vector(world_from_index.translation))
 }
 
 fn write_samples(file: &mut BufWriter<File>, samples: &Samples) -> io::Result<()> {

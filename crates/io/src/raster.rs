@@ -12,6 +12,7 @@ use bytemuck::Pod;
 use volery_scene::{Sample, SampleType, Samples, for_samples};
 
 use crate::bytes::{FileBytes, read_samples, reserve, samples_at};
+use crate::choice::{Choices, channel_note, checked_channel, wanted_volume};
 use crate::error::Problem;
 use crate::layout::{ByteOrder, Layout};
 use crate::numbers::{DATA, Number, Numbers, Scalar, for_scalar};
@@ -67,6 +68,7 @@ enum Take {
 /// An array of which it is settled what is read.
 pub(crate) struct Raster {
     pub(crate) layout: Layout,
+    pub(crate) choices: Choices,
     scalar: Scalar,
     take: Take,
     /// Numbers before the first that may be needed, and from there to the last.
@@ -104,7 +106,7 @@ impl Array<'_> {
             |role| axes.iter().filter(|axis| axis.1 == role).fold(1, |n: u64, axis| n.saturating_mul(axis.0));
         let (channels, volumes) = (product(Role::Channel), product(Role::Volume));
         let take = self.take(channels, options, notes)?;
-        let volume = wanted_volume(volumes, options, notes)?;
+        let volume = wanted_volume(volumes, options.time_step, notes)?;
         let mut spaces = axes.iter().filter(|axis| axis.1 == Role::Space).map(|axis| axis.0);
         let dims: [u64; 3] = std::array::from_fn(|_| spaces.next().unwrap_or(1));
         let sample = sample_type(self.scalar, take, channels);
@@ -113,15 +115,13 @@ impl Array<'_> {
         let total = total.filter(|total| total.checked_mul(8).is_some());
         let total = total
             .ok_or_else(|| Problem::field(self.field, format!("{sizes:?}"), "fewer than 2^61 numbers"))?;
-        Ok(self.raster(axes, layout, take, volume, total))
+        let choices = Choices { channels, time_steps: volumes };
+        Ok(Raster { choices, ..self.raster(axes, layout, take, volume, total) })
     }
 
     fn take(&self, channels: u64, options: &ReadOptions, notes: &mut Vec<String>) -> Result<Take, Problem> {
-        if let Some(channel) = options.channel {
-            return match u64::try_from(channel) {
-                Ok(channel) if channel < channels => Ok(Take::One(channel)),
-                _ => Err(Problem::field("channel asked for", channel, format!("0 to {}", channels - 1))),
-            };
+        if let Some(channel) = checked_channel(channels, options.channel)? {
+            return Ok(Take::One(channel));
         }
         let is_color = matches!(channels, 3 | 4) && self.meaning != Meaning::Channels;
         match (self.scalar, self.meaning) {
@@ -184,33 +184,17 @@ impl Array<'_> {
             };
         // A count that memory cannot address is no file's: reading ends where the file does.
         let count = usize::try_from(count).unwrap_or(usize::MAX);
-        Raster { layout, scalar: self.scalar, take, skip, count, axes: walked, is_plain, total }
-    }
-}
-
-/// What is said where one channel of several is drawn.
-pub(crate) fn channel_note(channel: usize, channels: u64) -> String {
-    format!("channel {channel} of {channels} is used (another one, 0 to {}, can be chosen)", channels - 1)
-}
-
-/// Which of several volumes is read.
-pub(crate) fn wanted_volume(
-    volumes: u64,
-    options: &ReadOptions,
-    notes: &mut Vec<String>,
-) -> Result<u64, Problem> {
-    match options.time_step {
-        None => {
-            if volumes > 1 {
-                notes.push(format!("the file holds {volumes} volumes; the first is used"));
-            }
-            Ok(0)
+        Raster {
+            layout,
+            choices: Choices::default(),
+            scalar: self.scalar,
+            take,
+            skip,
+            count,
+            axes: walked,
+            is_plain,
+            total,
         }
-        Some(step) => match u64::try_from(step) {
-            Ok(step) if step < volumes => Ok(step),
-            _ if volumes == 1 => Err(Problem::field("time step asked for", step, "0: the file holds one")),
-            _ => Err(Problem::field("time step asked for", step, format!("0 to {}", volumes - 1))),
-        },
     }
 }
 

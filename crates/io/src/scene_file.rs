@@ -20,6 +20,7 @@ use volery_scene::{Camera, TransferFunction, TransferFunction2d};
 
 use crate::bytes::load_text;
 use crate::error::{OneLine, Problem};
+use crate::grid::GridOptions;
 use crate::layout::Element;
 use crate::out::{WriteError, write_atomically};
 use crate::volume::ReadOptions;
@@ -135,6 +136,12 @@ pub struct SceneInput {
     /// The array to draw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub array: Option<String>,
+    /// Which of several numbers of each place to draw, from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channel: Option<usize>,
+    /// Which of several volumes or grids to draw, from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_step: Option<usize>,
 }
 
 /// Whether the input is a voxel volume or an unstructured grid.
@@ -235,9 +242,15 @@ fn usual_quality() -> f64 {
 impl SceneInput {
     /// How to read the file with [`read_volume`](crate::read_volume).
     pub fn read_options(&self) -> ReadOptions {
-        let Self { kind: _, file: _, dims, dtype, spacing, array } = self.clone();
+        let Self { kind: _, file: _, dims, dtype, spacing, array, channel, time_step } = self.clone();
         let spacing = spacing.map(glam::DVec3::from_array);
-        ReadOptions { dims, element: dtype, spacing, array, ..ReadOptions::default() }
+        ReadOptions { dims, element: dtype, spacing, array, channel, time_step, ..ReadOptions::default() }
+    }
+
+    /// How to read the file with [`read_grid`](crate::read_grid).
+    pub fn grid_options(&self) -> GridOptions {
+        let Self { array, channel, time_step, .. } = self.clone();
+        GridOptions { array, channel, time_step, ..GridOptions::default() }
     }
 }
 

@@ -8,6 +8,7 @@ use glam::DVec3;
 use volery_scene::{Samples, VoxelGrid};
 
 use crate::bytes::{self, Compression};
+use crate::choice::Choices;
 use crate::error::{Problem, ReadError, quoted};
 use crate::layout::Element;
 use crate::orientation::{Orientation, Placement, World};
@@ -123,6 +124,8 @@ pub struct Volume {
     pub format: Format,
     /// The name of the array, where the format names arrays.
     pub array: Option<String>,
+    /// What the file has of which this is one.
+    pub choices: Choices,
     /// What the world of the file is, which [`VoxelGrid::world_from_index`] leads to.
     pub world: World,
     /// The smallest and largest value that the file asks to show.
@@ -145,6 +148,7 @@ pub(crate) struct Decoded {
     pub(crate) spacing: DVec3,
     pub(crate) samples: Samples,
     pub(crate) array: Option<String>,
+    pub(crate) choices: Choices,
     /// Where the file says that the samples lie; `None` where it says nothing.
     pub(crate) placement: Option<Placement>,
     pub(crate) display_range: Option<[f64; 2]>,
@@ -154,12 +158,13 @@ pub(crate) struct Decoded {
 impl Decoded {
     /// Samples of a file that says no more.
     pub(crate) fn new(dims: [usize; 3], spacing: DVec3, samples: Samples, notes: Vec<String>) -> Self {
-        Self { dims, spacing, samples, array: None, placement: None, display_range: None, notes }
+        let choices = Choices::default();
+        Self { dims, spacing, samples, array: None, choices, placement: None, display_range: None, notes }
     }
 
     /// The volume, in the place that its file gives it unless the caller's spacing is another.
     fn volume(self, format: Format, options: &ReadOptions) -> Result<Volume, Problem> {
-        let Self { dims, spacing, samples, array, placement, display_range, mut notes } = self;
+        let Self { dims, spacing, samples, array, choices, placement, display_range, mut notes } = self;
         let mut grid = VoxelGrid::new(dims, spacing, samples).map_err(Problem::Grid)?;
         let placement = match options.spacing {
             Some(spacing) => placement.map(|placement| placement.with_spacing(spacing)),
@@ -177,7 +182,7 @@ impl Decoded {
                 }
             }
         }
-        Ok(Volume { grid, format, array, world, display_range, notes })
+        Ok(Volume { grid, format, array, choices, world, display_range, notes })
     }
 }
 

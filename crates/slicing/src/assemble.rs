@@ -4,6 +4,10 @@
 //! Sections bring their vertices and polygons, strips their vertices and triangles; a mesh has the vertices of all,
 //! and their triangles sheet after sheet by position. Places are computed in f64 relative to the middle of the
 //! grid's bounds, so that a grid far from the origin loses nothing, and rounded once.
+//!
+//! A polygon against the normal takes matter away: a hole in another one, of a cell that lists nodes more than once,
+//! or what a folded cell counts twice. Such polygons are turned around and come in a sheet of their own, of negative
+//! thickness, before the one of the others.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -17,6 +21,10 @@ use crate::section::Section;
 use crate::slicer::Slicer;
 use crate::stack::{Layer, Stack};
 use crate::strips::Strips;
+
+/// How far across a polygon against the normal is to be, over how far the outline reaches: less is rounding of its
+/// places to 32 bits.
+const LEAST_WIDTH: f64 = 1e-6;
 
 /// How far the outline may reach from its middle: places, and what executors make of them, are 32 bits.
 const MAX_REACH: f64 = 1e30;
@@ -190,7 +198,7 @@ impl Slicer {
         mesh.points = self.points(&mesh);
         mesh.set_values(values, gradients)?;
         pieces.sort_by(|a, b| a.position.total_cmp(&b.position));
-        mesh.triangulate(&pieces)?;
+        mesh.triangulate(&pieces, LEAST_WIDTH * reach.max_element())?;
         mesh.orient_strips(Rays::Along(normal));
         Ok(mesh)
     }
@@ -208,24 +216,22 @@ impl Slicer {
 }
 
 impl SliceMesh {
-    fn triangulate(&mut self, pieces: &[Piece<'_>]) -> Result<(), Error> {
+    /// A polygon against the normal counts where it is more than `least_width` across.
+    fn triangulate(&mut self, pieces: &[Piece<'_>], least_width: f64) -> Result<(), Error> {
         let found = pieces.iter().map(|piece| piece.count).sum();
         if u32::try_from(found).is_err() {
             return Err(Error::TooMany { what: "triangles", found });
         }
         let mut triangles = vec![[0; 3]; found];
-        let (mut jobs, mut rest, mut start) = (Vec::with_capacity(pieces.len()), triangles.as_mut_slice(), 0);
+        let (mut jobs, mut rest) = (Vec::with_capacity(pieces.len()), triangles.as_mut_slice());
         for piece in pieces {
             let (own, others) = rest.split_at_mut(piece.count);
             jobs.push((piece, own));
             rest = others;
-            let end = start + piece.count as u32;
-            let &Piece { position, thickness, .. } = piece;
-            self.sheets.push(MeshSheet { position, thickness, triangles: start..end });
-            start = end;
         }
         let (normal, points) = (self.normal, &self.points);
-        jobs.into_par_iter().for_each(|(piece, own)| {
+        // Returns how many triangles take matter away: the first ones.
+        let fill = |(piece, own): (&Piece<'_>, &mut [[u32; 3]])| {
             let numbered = |triangle: &[u32; 3]| triangle.map(|vertex| vertex + piece.first_vertex);
             let place = |vertex: u32| {
                 let [x, y, z, _] = points[(piece.first_vertex + vertex) as usize];
@@ -233,18 +239,36 @@ impl SliceMesh {
             };
             match piece.shape {
                 Shape::Section(section) => {
-                    let mut own = own.iter_mut();
-                    section.for_triangles(normal, place, |triangle| {
-                        if let Some(own) = own.next() {
-                            *own = numbered(&triangle);
-                        }
+                    let (mut given, mut taken) = (0, Vec::new());
+                    let mut give = |triangle: [u32; 3]| {
+                        own[given] = numbered(&triangle);
+                        given += 1;
+                    };
+                    section.for_triangles((normal, least_width), place, &mut give, |triangle| {
+                        taken.push(triangle);
                     });
+                    taken.iter().for_each(|&triangle| give(triangle));
+                    own.rotate_right(taken.len());
+                    taken.len()
                 }
                 Shape::Strip(triangles) => {
                     own.iter_mut().zip(triangles).for_each(|(own, triangle)| *own = numbered(triangle));
+                    0
                 }
             }
-        });
+        };
+        let num_taken: Vec<usize> = jobs.into_par_iter().map(fill).collect();
+        let mut start = 0;
+        for (&Piece { position, thickness, count, .. }, taken) in pieces.iter().zip(num_taken) {
+            for (sign, count) in [(-1.0, taken), (1.0, count - taken)] {
+                let triangles = start..start + count as u32;
+                start = triangles.end;
+                if !triangles.is_empty() {
+                    let thickness = if sign < 0.0 { thickness.map(|part| -part) } else { thickness };
+                    self.sheets.push(MeshSheet { position, thickness, triangles });
+                }
+            }
+        }
         self.triangles = triangles;
         Ok(())
     }

@@ -65,7 +65,7 @@ pub struct MeshSheet {
     /// Of a slice its plane, of strips the middle between two planes; along the normal, from the origin of the mesh.
     pub position: f64,
     /// `t = thickness[0] + thickness[1] * (normal . x)` with x relative to the origin, in world lengths: of a slice
-    /// `[t, 0]`, of strips with a slope of 1 or -1.
+    /// `[t, 0]`, negative where its triangles take matter away from another one there, of strips with a slope of 1 or -1.
     pub thickness: [f64; 2],
     /// Its triangles.
     pub triangles: Range<u32>,

@@ -17,7 +17,8 @@ impl Section {
     /// When there are fewer positions than vertices.
     pub fn triangles(&self, normal: DVec3, positions: &[DVec3]) -> Vec<[u32; 3]> {
         let mut triangles = Vec::with_capacity(self.num_triangles());
-        self.for_triangles(normal, |vertex| positions[vertex as usize], |triangle| triangles.push(triangle));
+        let position = |vertex: u32| positions[vertex as usize];
+        self.for_triangles((normal, f64::INFINITY), position, |triangle| triangles.push(triangle), |_| {});
         triangles
     }
 
@@ -26,19 +27,30 @@ impl Section {
         self.corners().len() - 2 * self.num_polygons()
     }
 
+    /// Hands out the triangles of all polygons around the normal: to `take` those of polygons that go against it and
+    /// are more than `least_width` across, which they have to be turned around for, to `give` those of the others.
     pub(crate) fn for_triangles(
         &self,
-        normal: DVec3,
+        (normal, least_width): (DVec3, f64),
         position: impl Fn(u32) -> DVec3,
         mut give: impl FnMut([u32; 3]),
+        mut take: impl FnMut([u32; 3]),
     ) {
+        let turn = |[a, b, c]: [u32; 3]| {
+            let [a, b, c] = [a, b, c].map(&position);
+            normal.dot((b - a).cross(c - b))
+        };
+        let is_same = |a: u32, b: u32| position(a) == position(b);
+        let clip = |rest: &mut Vec<u32>, give: &mut dyn FnMut([u32; 3])| {
+            while rest.len() > 3 {
+                let ear = ear(rest, turn, is_same);
+                give(around(rest, ear));
+                rest.remove(ear);
+            }
+            give([rest[0], rest[1], rest[2]]);
+        };
         let mut rest = Vec::new();
         for polygon in self.polygons() {
-            let turn = |[a, b, c]: [u32; 3]| {
-                let [a, b, c] = [a, b, c].map(&position);
-                normal.dot((b - a).cross(c - b))
-            };
-            let is_same = |a: u32, b: u32| position(a) == position(b);
             let is_convex = (0..polygon.len()).all(|at| turn(around(polygon, at)) >= 0.0);
             if is_convex {
                 polygon[1..].windows(2).for_each(|side| give([polygon[0], side[0], side[1]]));
@@ -46,14 +58,26 @@ impl Section {
             }
             rest.clear();
             rest.extend_from_slice(polygon);
-            while rest.len() > 3 {
-                let ear = ear(&rest, turn, is_same);
-                give(around(&rest, ear));
-                rest.remove(ear);
+            if is_against(polygon, normal, least_width, &position) {
+                rest.reverse();
+                clip(&mut rest, &mut take);
+            } else {
+                clip(&mut rest, &mut give);
             }
-            give([rest[0], rest[1], rest[2]]);
         }
     }
+}
+
+/// Whether a polygon goes against the normal, and its area is more than so wide a strip of its length.
+fn is_against(polygon: &[u32], normal: DVec3, least_width: f64, position: impl Fn(u32) -> DVec3) -> bool {
+    let first = position(polygon[0]);
+    let (mut twice_area, mut length) = (0.0, 0.0_f64);
+    for side in polygon[1..].windows(2) {
+        let [from, to] = [position(side[0]) - first, position(side[1]) - first];
+        twice_area += normal.dot(from.cross(to));
+        length = length.max(from.length()).max(to.length());
+    }
+    -0.5 * twice_area > least_width * length
 }
 
 /// A corner between its neighbours.

@@ -1,21 +1,26 @@
 //! A camera that shows what there is to see.
 //!
 //! # Method
-//! Every sample of a level of at most [`MAX_SAMPLES`] weighs as much as its opacity. The domain is divided
+//! Every sample of a level of at most [`MAX_SAMPLES`], or cell of a grid, weighs as much as its opacity. The domain is divided
 //! into blocks, at most [`MAX_BLOCKS`] along an axis, and the lightest blocks are left out as long as they hold
 //! no more than [`TRIM`] of all weight together, so that specks of noise do not push the camera away. The camera
 //! then stands as near as it can with every corner of the other blocks in the picture, and in its middle.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use volery_pyramid::{NodeSource, Pyramid};
-use volery_scene::{Camera, Projection, TransferFunction};
+use volery_scene::{Camera, Projection, Samples, TransferFunction, UnstructuredGrid};
 
 /// Samples looked at, at most.
 pub const MAX_SAMPLES: usize = 1 << 21;
 
 /// Blocks along an axis, at most.
 pub const MAX_BLOCKS: usize = 32;
+
+/// Values of a cell whose opacity is looked at, from its lowest to its highest.
+const VALUES_PER_CELL: u32 = 9;
 
 /// Share of opacity that may lie outside all blocks.
 pub const TRIM: f64 = 0.002;
@@ -94,8 +99,51 @@ pub fn visible_blocks(pyramid: &Pyramid, transfer: &TransferFunction) -> Vec<[DV
         let end = layout.domain() * layout.spacing();
         (weight, [corner(first), corner(last).min(end)])
     };
-    let mut blocks: Vec<(f64, [DVec3; 2])> =
-        (0..num_blocks.iter().product()).into_par_iter().map(weigh).collect();
+    let blocks = (0..num_blocks.iter().product()).into_par_iter().map(weigh).collect();
+    heaviest(blocks).unwrap_or_else(|| vec![[DVec3::ZERO, layout.domain() * layout.spacing()]])
+}
+
+/// Boxes in world units around the visible matter of cells; those of all cells if nothing is visible.
+///
+/// A cell weighs its box times the mean opacity over its values, and is in the block of its middle.
+pub fn visible_cells(
+    grid: &UnstructuredGrid,
+    values: &Samples,
+    transfer: &TransferFunction,
+) -> Vec<[DVec3; 2]> {
+    let Some([first, last]) = grid.world_bounds() else { return vec![[DVec3::ZERO; 2]] };
+    let size = (last - first) / MAX_BLOCKS as f64;
+    let mut blocks: BTreeMap<[usize; 3], (f64, [DVec3; 2])> = BTreeMap::new();
+    for (cell, (_, nodes)) in grid.cells().iter().enumerate() {
+        if grid.is_blank(cell) {
+            continue;
+        }
+        let nodes = || nodes.iter().map(|&node| node as usize);
+        let own = nodes().map(|node| values.value(node, 0));
+        let [low, high] =
+            own.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+        if transfer.is_transparent(low, high) {
+            continue;
+        }
+        let value = |step: u32| low + (high - low) * f64::from(step) / f64::from(VALUES_PER_CELL - 1);
+        let opacity: f64 = (0..VALUES_PER_CELL).map(|step| transfer.classify(value(step)).1).sum();
+        let bounds = nodes().map(|node| [grid.points()[node]; 2]).reduce(around);
+        let Some([from, to]) = bounds else { continue };
+        // Along a flat axis the place is no number, which is block 0.
+        let place = ((0.5 * (from + to) - first) / size).to_array().map(|place| place as usize);
+        let block = blocks.entry(place).or_insert((0.0, [from, to]));
+        block.0 += opacity * (to - from).element_product();
+        block.1 = around(block.1, [from, to]);
+    }
+    heaviest(blocks.into_values().collect()).unwrap_or_else(|| vec![[first, last]])
+}
+
+fn around([low, high]: [DVec3; 2], [other_low, other_high]: [DVec3; 2]) -> [DVec3; 2] {
+    [low.min(other_low), high.max(other_high)]
+}
+
+/// Boxes without the lightest ones, which have [`TRIM`] of all weight together; `None` if none weighs anything.
+fn heaviest(mut blocks: Vec<(f64, [DVec3; 2])>) -> Option<Vec<[DVec3; 2]>> {
     blocks.sort_by(|a, b| a.0.total_cmp(&b.0));
     let all: f64 = blocks.iter().map(|(weight, _)| weight).sum();
     let mut sum = 0.0;
@@ -104,10 +152,7 @@ pub fn visible_blocks(pyramid: &Pyramid, transfer: &TransferFunction) -> Vec<[DV
         sum <= all * TRIM
     });
     let num_light = light.count();
-    if num_light == blocks.len() {
-        return vec![[DVec3::ZERO, layout.domain() * layout.spacing()]];
-    }
-    blocks[num_light..].iter().map(|&(_, block)| block).collect()
+    (num_light < blocks.len()).then(|| blocks[num_light..].iter().map(|&(_, block)| block).collect())
 }
 
 /// The camera that shows boxes of positive size from a direction, in a picture `aspect` times as wide as high.
@@ -196,7 +241,7 @@ pub fn orthographic(camera: &Camera) -> Camera {
 mod tests {
     use super::*;
     use volery_pyramid::Kind;
-    use volery_scene::{ControlPoint, VoxelGrid};
+    use volery_scene::{CellType, Cells, ControlPoint, VoxelGrid};
 
     fn corners_fill_the_picture(bounds: [DVec3; 2], camera: &Camera, aspect: f64) -> f64 {
         let [right, up, forward] = camera.axes();
@@ -271,6 +316,34 @@ mod tests {
         assert!((first - low).max_element() <= 4.0 && (high - last).max_element() <= 4.0, "{low} {high}");
         let clear = TransferFunction::new(vec![point(0.0, 0.0)], 1.0).unwrap();
         assert_eq!(visible_blocks(&pyramid, &clear), [[DVec3::ZERO, grid.extent()]]);
+    }
+
+    #[test]
+    fn the_visible_cells_hold_the_matter_and_not_the_rest() {
+        // A row of boxes, of which one in the middle can be seen.
+        let points = (0..=50).flat_map(|x| {
+            (0..4).map(move |at| DVec3::new(f64::from(x), f64::from(at & 1), f64::from(at >> 1)))
+        });
+        let points: Vec<DVec3> = points.collect();
+        let nodes = (0..50_u32).flat_map(|x| [0, 4, 1, 5, 2, 6, 3, 7].map(|node| 4 * x + node));
+        let cells = Cells::new(vec![CellType::Voxel; 50], nodes.collect()).unwrap();
+        let grid = UnstructuredGrid::new(points, cells).unwrap();
+        let value = |node: usize| if (20..=21).contains(&(node / 4)) { 10.0 } else { 0.0 };
+        let values = Samples::from((0..204).map(value).collect::<Vec<f64>>());
+        let point = |value, opacity| ControlPoint { value, color: [1.0; 3], opacity };
+        let whole = [DVec3::ZERO, DVec3::new(50.0, 1.0, 1.0)];
+        let bounds = |points: Vec<ControlPoint>| {
+            let transfer = TransferFunction::new(points, 1.0).unwrap();
+            visible_cells(&grid, &values, &transfer).into_iter().reduce(around).unwrap()
+        };
+        // From 9 on: that one alone. Above 5 its neighbours, too. A band that no node is in: these alone.
+        let box_of = |from, to| [DVec3::new(from, 0.0, 0.0), DVec3::new(to, 1.0, 1.0)];
+        assert_eq!(bounds(vec![point(9.99, 0.0), point(10.0, 1.0)]), box_of(19.0, 22.0));
+        assert_eq!(bounds(vec![point(4.0, 0.0), point(5.0, 0.5), point(6.0, 0.0)]), box_of(19.0, 22.0));
+        assert_eq!(bounds(vec![point(-1.0, 0.5)]), whole);
+        assert_eq!(bounds(vec![point(0.0, 0.0)]), whole);
+        // Specks of noise do not push the camera away.
+        assert_eq!(bounds(vec![point(0.0, 1e-5), point(1.0, 1e-5), point(5.0, 0.9)]), box_of(19.0, 22.0));
     }
 
     #[test]

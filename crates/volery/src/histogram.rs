@@ -10,7 +10,10 @@
 use rayon::prelude::*;
 use volery_scene::{Sample, SampleType, Samples, VoxelGrid, for_samples};
 
+mod cells;
 mod matter;
+
+pub(crate) use cells::by_volume;
 
 /// Most bins of a histogram.
 pub const MAX_BINS: usize = 1024;

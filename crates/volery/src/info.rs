@@ -7,9 +7,11 @@ use volery_io::{Volume, World};
 
 use crate::histogram::Histogram;
 
+mod choices;
 mod grid;
 mod stack;
 
+pub use choices::Choices;
 pub use grid::{ArrayInfo, DefectInfo, GridInfo};
 pub use stack::StackInfo;
 
@@ -44,6 +46,9 @@ pub struct Info {
     /// Name of the array that was read, where the format names arrays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub array: Option<String>,
+    /// Which of several is drawn, where there are several.
+    #[serde(skip_serializing_if = "Choices::is_empty")]
+    pub choices: Choices,
     /// One, or three or four for colours.
     pub channels: Vec<Channel>,
     /// What the reader decided, a sentence each.
@@ -95,6 +100,7 @@ impl Info {
             origin: (origin != [0.0; 3]).then_some(origin),
             display_range: volume.display_range,
             array: volume.array.clone(),
+            choices: volume.choices.into(),
             channels: channels.collect(),
             notes: volume.notes.clone(),
         }
@@ -122,6 +128,7 @@ impl fmt::Display for Info {
         if let Some(array) = &self.array {
             writeln!(f, "array     {}", array.escape_debug())?;
         }
+        write!(f, "{}", self.choices)?;
         for (index, channel) in self.channels.iter().enumerate() {
             if self.channels.len() > 1 {
                 writeln!(f, "channel   {index}")?;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use volery_io::mesh::MAX_MESH_BYTES;
 use volery_io::scene_file::{InputKind, SceneError, SceneInput, SceneMesh};
-use volery_io::{GridFile, GridOptions, OpenedFile, ReadError, SceneFile, Volume};
+use volery_io::{Format, GridFile, OpenedFile, ReadError, SceneFile, Volume};
 use volery_io::{is_grid, read_grid, read_mesh, read_stack, read_volume, recording_files};
 use volery_scene::TriangleMesh;
 use volery_slicing::QuantizedMesh;
@@ -130,7 +130,7 @@ impl InputOptions {
         }
         let scene = SceneFile::read(path)?;
         let folder = self.data_dir.as_deref().unwrap_or_else(|| path.parent().unwrap_or(Path::new("")));
-        let SceneInput { kind, file, dims, dtype, spacing, array } = scene.input.clone();
+        let SceneInput { kind, file, dims, dtype, spacing, array, channel, time_step } = scene.input.clone();
         let input = SceneInput {
             kind: own.kind.or(kind),
             file: folder.join(file),
@@ -138,6 +138,8 @@ impl InputOptions {
             dtype: own.dtype.or(dtype),
             spacing: own.spacing.or(spacing),
             array: own.array.or(array),
+            channel: own.channel.or(channel),
+            time_step: own.time_step.or(time_step),
         };
         let mesh = |mesh: &SceneMesh| SceneMesh { file: folder.join(&mesh.file), color: mesh.color };
         let meshes = scene.meshes.iter().map(mesh).collect();
@@ -173,7 +175,7 @@ impl InputPlan {
     }
 
     fn read_data(&self, mesh_notes: Vec<String>) -> Result<InputData, InputError> {
-        let SceneInput { kind, file: path, array, .. } = &self.input;
+        let SceneInput { kind, file: path, .. } = &self.input;
         let data = match kind {
             None if is_stack(path) => {
                 self.refuse_unread(&[], "a stack of slices")?;
@@ -182,9 +184,8 @@ impl InputPlan {
             Some(InputKind::Volume) => self.read_volume(mesh_notes)?,
             None if !path.is_file() || !is_grid(path) => self.read_volume(mesh_notes)?,
             _ => {
-                self.refuse_unread(&["--array"], "an unstructured grid")?;
-                let options = GridOptions { array: array.clone(), ..GridOptions::default() };
-                let mut file = read_grid(path, &options)?;
+                self.refuse_unread(&["--array", "--channel", "--time-step"], "an unstructured grid")?;
+                let mut file = read_grid(path, &self.input.grid_options())?;
                 file.notes.extend(mesh_notes);
                 InputData::Grid(file)
             }
@@ -198,18 +199,26 @@ impl InputPlan {
             let found = format!("a volume, {}", volume.format);
             return Err(self.unread("--array", &found, "a file whose format names arrays"));
         }
+        if volume.format == Format::Raw {
+            self.refuse_unread(
+                &["--dims", "--dtype", "--spacing"],
+                "a raw file, which holds one volume of numbers",
+            )?;
+        }
         volume.notes.extend(mesh_notes);
         Ok(InputData::Volume(volume))
     }
 
     /// Refuses options but for those that such a file reads.
     fn refuse_unread(&self, read: &[&str], found: &str) -> Result<(), InputError> {
-        let SceneInput { kind: _, file: _, dims, dtype, spacing, array } = &self.input;
+        let SceneInput { kind: _, file: _, dims, dtype, spacing, array, channel, time_step } = &self.input;
         let given = [
             ("--dims", dims.is_some(), "a volume"),
             ("--dtype", dtype.is_some(), "a volume"),
             ("--spacing", spacing.is_some(), "a volume"),
             ("--array", array.is_some(), "a file whose format names arrays"),
+            ("--channel", channel.is_some(), "a file whose format knows several"),
+            ("--time-step", time_step.is_some(), "a file whose format knows several"),
         ];
         match given.into_iter().find(|(option, is_given, _)| *is_given && !read.contains(option)) {
             None => Ok(()),

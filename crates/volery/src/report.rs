@@ -4,10 +4,11 @@
 
 use std::collections::BTreeMap;
 
+use glam::DAffine3;
 use serde::Serialize;
 use volery_frame::{Device, DeviceKind};
-use volery_io::OpenedFile;
 use volery_io::scene_file::{SceneTransfer, serialize_camera, serialize_transfer};
+use volery_io::{OpenedFile, Volume, World};
 use volery_scene::Camera;
 
 use crate::view::{Transfer, View};
@@ -69,6 +70,34 @@ pub struct Input {
     pub cells: Option<BTreeMap<&'static str, usize>>,
     /// Type of a sample: `u8`, `f32`, ...
     pub scalar: &'static str,
+    /// Where samples lie in the world of their file; missing if the file says no more than their distances.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub place: Option<Place>,
+}
+
+/// Where samples lie in the world of their file. Pictures are drawn along the axes of the samples.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// Which way the axes of the samples run, as `LPS` or `+x -y +z`.
+    pub orientation: String,
+    /// From the index of a sample to its place: three rows, each of the factors of x, y, z and what is added. Of
+    /// anatomical files the world runs to the right, to the front and to the head.
+    pub world_from_index: [[f64; 4]; 3],
+}
+
+impl Place {
+    /// That of a volume; `None` if its file says no more than distances.
+    pub fn of(volume: &Volume) -> Option<Self> {
+        let world_from_index = volume.grid.world_from_index();
+        let is_plain = world_from_index == DAffine3::from_scale(volume.grid.spacing());
+        let (matrix, origin) = (world_from_index.matrix3, world_from_index.translation);
+        let row = |axis| matrix.row(axis).extend(origin[axis]).to_array();
+        let place = || Self {
+            orientation: volume.orientation().to_string(),
+            world_from_index: [row(0), row(1), row(2)],
+        };
+        (volume.world == World::Anatomical || !is_plain).then(place)
+    }
 }
 
 /// A file that was read.

@@ -105,7 +105,7 @@ fn read(folder: &Path, kind: &str, file: &str) -> Input {
 
 fn read_volume_scene(grid: &volery::VoxelGrid) -> (tempfile::TempDir, Input) {
     let folder = tempfile::tempdir().unwrap();
-    volery_io::write_nrrd(&folder.path().join("volume.nrrd"), grid).unwrap();
+    volery_io::write_nrrd(&folder.path().join("volume.nrrd"), grid, volery_io::World::Plain).unwrap();
     let input = read(folder.path(), "volume", "volume.nrrd");
     (folder, input)
 }

@@ -6,13 +6,28 @@ use volery::io::scene_file::SceneInput;
 
 use super::numbers;
 
+/// Which of several things in a file.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ChoiceArgs {
+    /// The array to draw, of files that have several [default: the scene's, else the file's own]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) array: Option<String>,
+    /// The number of each place to draw, from 0, where a place has several: a channel of colours, a component of
+    /// vectors [default: colours as they are, vectors by their magnitude, of other channels the first]
+    #[arg(long, visible_alias = "component", value_name = "N", value_parser = index, allow_negative_numbers = true)]
+    pub(crate) channel: Option<usize>,
+    /// The volume or grid to draw, from 0, of files that have several: time steps of an Exodus file or a .pvd, volumes
+    /// of a 4D NIfTI, times of a TIFF [default: the first]
+    #[arg(long, visible_alias = "volume", value_name = "N", value_parser = index, allow_negative_numbers = true)]
+    pub(crate) time_step: Option<usize>,
+}
+
 /// How to read a file.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Reading")]
 pub(crate) struct FileArgs {
-    /// The array to draw, of files that have several [default: the scene's, else the file's own]
-    #[arg(long, value_name = "NAME")]
-    pub(crate) array: Option<String>,
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
     /// Samples along x, y and z, for a raw file whose name does not tell
     #[arg(long, value_name = "NX,NY,NZ", value_parser = parse_dims, allow_hyphen_values = true)]
     pub(crate) dims: Option<[usize; 3]>,
@@ -27,15 +42,22 @@ pub(crate) struct FileArgs {
 impl FileArgs {
     /// As a scene has them.
     pub(crate) fn of_scene(&self) -> SceneInput {
-        let Self { array, dims, dtype, spacing } = self;
+        let Self { choice: ChoiceArgs { array, channel, time_step }, dims, dtype, spacing } = self;
         SceneInput {
             array: array.clone(),
+            channel: *channel,
+            time_step: *time_step,
             dims: *dims,
             dtype: *dtype,
             spacing: *spacing,
             ..SceneInput::default()
         }
     }
+}
+
+/// Reads a whole number from 0.
+fn index(text: &str) -> Result<usize, String> {
+    text.parse().map_err(|_| "expected a whole number from 0".to_owned())
 }
 
 fn parse_dims(text: &str) -> Result<[usize; 3], String> {

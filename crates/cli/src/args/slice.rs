@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use volery::glam::DVec3;
 
-use super::{has_ending, numbers, whole, with_ending};
+use super::{ChoiceArgs, has_ending, numbers, whole, with_ending};
 
 /// `volery slice`
 #[derive(Debug, Args)]
@@ -17,7 +17,7 @@ use super::{has_ending, numbers, whole, with_ending};
 A .glb file opens in viewers of glTF 2.0 that know KHR_mesh_quantization; with --meshopt it is about a quarter of
 the size, for those that know EXT_meshopt_compression too. A .vsl file is smaller still.")]
 pub(crate) struct SliceArgs {
-    /// A grid: .vtu, .pvtu, .vtk, .ex2
+    /// A grid: .vtu, .pvtu, .pvd, .vtk, .ex2
     #[arg(value_name = "GRID")]
     pub(crate) input: PathBuf,
     /// The slices
@@ -31,9 +31,8 @@ pub(crate) struct SliceArgs {
     #[arg(long, value_name = "x|y|z|NX,NY,NZ", default_value = "z", value_parser = parse_axis,
         allow_hyphen_values = true)]
     pub(crate) axis: DVec3,
-    /// The array whose values the slices have [default: the file's own]
-    #[arg(long, value_name = "NAME")]
-    pub(crate) array: Option<String>,
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
     /// Compress the .glb by EXT_meshopt_compression
     #[arg(long)]
     pub(crate) meshopt: bool,

@@ -28,7 +28,13 @@ pub(crate) struct StackArgs {
     pub(crate) quantized: bool,
     /// Draw each time step of a collection, or each of these grids; OUT, the report and the error map then need a
     /// place for the number, such as OUT-%03d.png
-    #[arg(long, value_name = "FILE.pvd|FILE,FILE,...", value_delimiter = ',', num_args = 1)]
+    #[arg(
+        long,
+        value_name = "FILE.pvd|FILE,FILE,...",
+        value_delimiter = ',',
+        num_args = 1,
+        conflicts_with = "time_step"
+    )]
     pub(crate) time_steps: Vec<PathBuf>,
 }
 

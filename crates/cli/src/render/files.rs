@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use volery::info::number;
 use volery::io::write_atomically;
 use volery::output::{ErrorMap, write_image};
-use volery::report::InputFile;
+use volery::report::{InputFile, Place};
 use volery::{Data, Input, Picture, Report, Session, Transfer, VerifyError, View, reference};
 
 use super::{Run, empty};
 use crate::args::numbered;
 use crate::progress::Progress;
-use crate::{Failure, save, say};
+use crate::{Failure, save, say, wanted};
 
 /// What a stage of a picture may add to its error without a word.
 const MAX_STAGE_ERROR: f64 = 0.01;
@@ -82,6 +82,12 @@ pub(super) fn finish<D: Data>(
         save::save_scene(path, wanted, view, session.data().has_colors())?;
     }
     notes(input.notes(), session, view)?;
+    if let Some([low, high]) = wanted::window(args, wanted, input, session) {
+        let [low, high] = [low, high].map(number);
+        say(format_args!(
+            "note: colours run over the values that the file asks to show, {low} to {high} (--range for others)"
+        ))?;
+    }
     match empty::reason(&picture.image, view, input) {
         None => Ok(()),
         Some(reason) => say(format_args!("note: nothing is seen: {reason}")),
@@ -91,6 +97,7 @@ pub(super) fn finish<D: Data>(
 /// Says in a report what was read.
 pub(super) fn name_sources(report: &mut Report, input: &Input) {
     report.input.path = Some(input.path.to_string_lossy().into_owned());
+    report.input.place = input.volume().ok().and_then(Place::of);
     report.inputs = input.files.iter().map(InputFile::from).collect();
     report.seconds.load = Some(input.load_seconds);
 }

@@ -98,8 +98,8 @@ fn time_steps(
     for (number, step) in steps.iter().enumerate() {
         bar.set(number as f64 / steps.len() as f64);
         let start = Instant::now();
-        let options =
-            GridOptions { array: Some(session.data().array().to_owned()), ..GridOptions::default() };
+        let (array, channel) = (Some(session.data().array().to_owned()), run.wanted.input.channel);
+        let options = GridOptions { array, channel, ..GridOptions::default() };
         let (file, opened) = recording_files(|| step.read(&options));
         let file = file?;
         run.outputs.check_inputs(opened.iter().map(|file| file.path.as_path()))?;

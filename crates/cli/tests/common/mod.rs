@@ -7,6 +7,7 @@ use std::process::Command;
 
 use volery::VoxelGrid;
 use volery::glam::DVec3;
+use volery::io::World;
 
 /// What the program did.
 pub(crate) struct Outcome {
@@ -30,7 +31,7 @@ impl Workshop {
     }
 
     pub(crate) fn write_volume(&self, name: impl AsRef<OsStr>, grid: &VoxelGrid) {
-        volery::io::write_nrrd(&self.path(name), grid).expect("a volume is written");
+        volery::io::write_nrrd(&self.path(name), grid, World::Plain).expect("a volume is written");
     }
 
     pub(crate) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
@@ -119,6 +120,36 @@ pub(crate) fn scene_json(file: &str) -> serde_json::Value {
 /// A small volume with spacing.
 pub(crate) fn head() -> VoxelGrid {
     volery_data::head([72, 90, 90], DVec3::splat(2.5))
+}
+
+/// A volume of 32-bit floats in words, so that axes may be of any kind.
+pub(crate) fn text_nrrd(sizes: &str, kinds: &str, value: impl Fn(usize) -> f64) -> String {
+    let count: usize = sizes.split(' ').map(|size| size.parse::<usize>().expect("a size")).product();
+    let dimension = sizes.split(' ').count();
+    let values: Vec<String> = (0..count).map(|i| value(i).to_string()).collect();
+    format!(
+        "NRRD0004\ntype: float\ndimension: {dimension}\nsizes: {sizes}\nkinds: {kinds}\nencoding: text\n\n{}\n",
+        values.join(" ")
+    )
+}
+
+/// Numbers of which no two that stand near each other are the same.
+pub(crate) fn vector(i: usize) -> f64 {
+    (i * i % 101) as f64 + 0.25 * i as f64
+}
+
+/// The generated grid with a vector at each node beside its values: three times its place, along each axis.
+pub(crate) fn legacy_vectors() -> String {
+    let points = volery_data::cylinder(2).points().to_vec();
+    let lines = points.iter().map(|p| format!("{} {} {}", 3.0 * p.x, 3.0 * p.y, 3.0 * p.z));
+    format!("{}VECTORS flow double\n{}\n", legacy_grid(1.0, usize::MAX), lines.collect::<Vec<_>>().join("\n"))
+}
+
+/// A collection of these files, a time step each.
+pub(crate) fn collection(files: &[&str]) -> String {
+    let step = |(time, file): (usize, &&str)| format!("<DataSet timestep=\"{time}\" file=\"{file}\"/>");
+    let steps: String = files.iter().enumerate().map(step).collect();
+    format!("<?xml version=\"1.0\"?><VTKFile type=\"Collection\"><Collection>{steps}</Collection></VTKFile>")
 }
 
 /// A file of the generated grid in VTK's legacy format: its values times a factor, some of its cells.

@@ -7,6 +7,7 @@ use glam::DVec3;
 use netcdf_reader::{NcFile, NcSliceInfo, NcSliceInfoElem, NcType};
 
 use super::{GridArray, Part, Piece, PieceArray, PieceCells, Place};
+use crate::choice::{checked_step, first_note};
 use crate::error::Problem;
 
 /// Names take more memory than bytes in the file.
@@ -25,7 +26,6 @@ struct Exodus {
     num_steps: u64,
     /// The one that is read.
     step: u64,
-    is_step_chosen: bool,
 }
 
 /// Elements of one type.
@@ -41,7 +41,7 @@ struct Block {
 pub(super) fn with_parts<R>(
     bytes: &[u8],
     step: Option<usize>,
-    run: impl FnOnce(&[Part]) -> Result<R, Problem>,
+    run: impl FnOnce(u64, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
     if bytes.starts_with(b"\x89HDF") {
         let expected = "Exodus II in netCDF-3 (classic), as 'nccopy -k cdf5' makes it";
@@ -49,15 +49,12 @@ pub(super) fn with_parts<R>(
     }
     let file = NcFile::from_bytes(bytes).map_err(|error| Problem::damaged("the netCDF header", error))?;
     let mut exodus = Exodus::new(file, bytes.len() as u64)?;
-    if let Some(step) = step {
-        exodus.step = step as u64;
-        exodus.is_step_chosen = true;
-        if exodus.step >= exodus.num_steps.max(1) {
-            let expected = format!("0 to {}", exodus.num_steps.max(1) - 1);
-            return Err(Problem::field("time step asked for", step, expected));
-        }
-    }
-    run(&[Part::new(None, exodus)])
+    // A file without values has its mesh.
+    let num_steps = exodus.num_steps.max(1);
+    exodus.step = checked_step(num_steps, step)?.unwrap_or(0);
+    let mut part = Part::new(None, exodus);
+    part.notes.extend(first_note("time steps", num_steps, step));
+    run(num_steps, &[part])
 }
 
 impl Exodus {
@@ -72,7 +69,6 @@ impl Exodus {
             numbers: Vec::new(),
             num_steps: 0,
             step: 0,
-            is_step_chosen: false,
         };
         let expected = "the dimension of an Exodus II file";
         let needed = |name: &str| exodus.dimension(name)?.ok_or_else(|| Problem::missing(name, expected));
@@ -249,20 +245,6 @@ impl Piece for Exodus {
 
     fn arrays(&self) -> &[PieceArray] {
         &self.arrays
-    }
-
-    fn notes(&self) -> Vec<String> {
-        let several = self.num_steps > 1 && !self.is_step_chosen;
-        several
-            .then(|| {
-                let last = self.num_steps - 1;
-                format!(
-                    "the file has {} time steps; the first is used (another, 0 to {last}, can be chosen)",
-                    self.num_steps
-                )
-            })
-            .into_iter()
-            .collect()
     }
 
     fn points(&self) -> Result<Vec<DVec3>, Problem> {

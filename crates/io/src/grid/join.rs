@@ -6,7 +6,10 @@ use glam::DVec3;
 use volery_scene::{CellType, Cells, UnstructuredGrid};
 
 use super::kinds::{self, Kind};
-use super::{ArrayRange, GridArray, GridOptions, Part, Piece, PieceArray, PieceCells, Place};
+use super::{
+    ArrayRange, GridArray, GridFile, GridFormat, GridOptions, Part, Piece, PieceArray, PieceCells, Place,
+};
+use crate::choice::{Choices, checked_channel};
 use crate::error::{OneLine, Problem, quoted};
 use crate::near::one_of;
 
@@ -22,20 +25,22 @@ const HIDDEN: u8 = 32;
 const HIDDEN_POINT: u8 = 2;
 
 /// Reads and joins the pieces; also says which array was read and what was decided.
-pub(super) fn join(
-    parts: &[Part],
-    options: &GridOptions,
-) -> Result<(UnstructuredGrid, Option<GridArray>, Vec<String>), Problem> {
+pub(super) fn join(format: GridFormat, parts: &[Part], options: &GridOptions) -> Result<GridFile, Problem> {
     let bytes_left = bytes_left(parts, options)?;
     let mut decided = Vec::new();
     let array = choose(parts, options.array.as_deref(), &mut decided)?;
+    if let Some(channel) = options.channel.filter(|_| array.is_none()) {
+        return Err(Problem::field("channel asked for", channel, "none: the file has no array"));
+    }
+    let channels = array.as_ref().map_or(1, |array| array.components as u64);
+    let channel = checked_channel(channels, options.channel)?.map(|channel| channel as usize);
     let has_several = parts.iter().filter(|part| part.piece.num_cells() > 0).count() > 1;
     let places = has_several.then(HashMap::new);
     let mut joined = Joined { nodes_left: bytes_left / NODE_BYTES, places, ..Joined::default() };
     for part in parts.iter().filter(|part| part.piece.num_cells() > 0) {
-        part.run(|piece| joined.add(piece, array.as_ref()))?;
+        part.run(|piece| joined.add(piece, array.as_ref(), channel))?;
     }
-    let (grid, mut notes) = joined.finish(array.as_ref())?;
+    let (grid, mut notes) = joined.finish(array.as_ref(), channel)?;
     for note in parts.iter().flat_map(|part| [part.notes.clone(), part.piece.notes()].concat()) {
         // Pieces of one grid often say the same.
         if !decided.contains(&note) {
@@ -43,7 +48,7 @@ pub(super) fn join(
         }
     }
     notes.append(&mut decided);
-    Ok((grid, array, notes))
+    Ok(GridFile { grid, format, array, choices: Choices { channels, time_steps: 1 }, notes })
 }
 
 /// The ranges of all arrays.
@@ -51,9 +56,11 @@ pub(super) fn ranges(parts: &[Part], options: &GridOptions) -> Result<Vec<ArrayR
     bytes_left(parts, options)?;
     let range_of = |array: &PieceArray| {
         let array = array.array.clone();
+        let channel = options.channel.filter(|channel| (0..array.components).contains(channel));
+        let channel = channel.filter(|_| array.components > 1);
         let (mut range, mut blank, mut problem) = ([f64::INFINITY, f64::NEG_INFINITY], 0, None);
         for part in parts {
-            match part.run(|piece| magnitudes(piece, &array)) {
+            match part.run(|piece| scalars(piece, &array, channel)) {
                 Ok(values) => {
                     for value in values {
                         if value.is_finite() {
@@ -67,7 +74,7 @@ pub(super) fn ranges(parts: &[Part], options: &GridOptions) -> Result<Vec<ArrayR
             }
         }
         let range = (range[0] <= range[1] && problem.is_none()).then_some(range);
-        ArrayRange { array, range, blank, problem }
+        ArrayRange { array, channel, range, blank, problem }
     };
     Ok(arrays(parts).iter().map(range_of).collect())
 }
@@ -176,15 +183,16 @@ fn index_of(piece: &dyn Piece, array: &GridArray) -> Result<usize, Problem> {
     })
 }
 
-/// The values of an array, those of several components by their magnitude.
-fn magnitudes(piece: &dyn Piece, array: &GridArray) -> Result<Vec<f64>, Problem> {
+/// The values of an array; of several components one, or their magnitude.
+fn scalars(piece: &dyn Piece, array: &GridArray, channel: Option<usize>) -> Result<Vec<f64>, Problem> {
     if piece_tuples(piece, array) == 0 {
         return Ok(Vec::new());
     }
     let values = piece.values(index_of(piece, array)?)?;
-    Ok(match array.components {
-        1 => values,
-        components => {
+    Ok(match (array.components, channel) {
+        (1, _) => values,
+        (components, Some(channel)) => values.into_iter().skip(channel).step_by(components).collect(),
+        (components, None) => {
             values.chunks(components).map(|value| value.iter().fold(0.0, |a, b| f64::hypot(a, *b))).collect()
         }
     })
@@ -248,14 +256,19 @@ struct Counts {
 }
 
 impl Joined {
-    fn add(&mut self, piece: &dyn Piece, array: Option<&GridArray>) -> Result<(), Problem> {
+    fn add(
+        &mut self,
+        piece: &dyn Piece,
+        array: Option<&GridArray>,
+        channel: Option<usize>,
+    ) -> Result<(), Problem> {
         let cells = piece.cells(self.nodes_left)?;
         self.nodes_left -= (cells.nodes.len() as u64).min(self.nodes_left);
         let ghosts =
             Ghosts { cells: ghost_bits(piece, Place::Cells)?, points: ghost_bits(piece, Place::Points)? };
         let (points, mut values) = (piece.points()?, None);
         if let Some(array) = array {
-            values = Some(magnitudes(piece, array)?);
+            values = Some(scalars(piece, array, channel)?);
         }
         let on_points = array.is_some_and(|array| array.place == Place::Points);
         let places = self.add_points(points, values.as_deref().filter(|_| on_points));
@@ -347,8 +360,12 @@ impl Joined {
         Ok(())
     }
 
-    fn finish(mut self, array: Option<&GridArray>) -> Result<(UnstructuredGrid, Vec<String>), Problem> {
-        let notes = self.counts.notes(array);
+    fn finish(
+        mut self,
+        array: Option<&GridArray>,
+        channel: Option<usize>,
+    ) -> Result<(UnstructuredGrid, Vec<String>), Problem> {
+        let notes = self.counts.notes(array, channel);
         if self.types.is_empty() {
             let expected = "at least one that has volume";
             let found = if notes.is_empty() { "0".to_owned() } else { format!("0 ({})", notes.join("; ")) };
@@ -371,15 +388,19 @@ impl Joined {
 }
 
 impl Counts {
-    fn notes(&self, array: Option<&GridArray>) -> Vec<String> {
+    fn notes(&self, array: Option<&GridArray>, channel: Option<usize>) -> Vec<String> {
         let list = |counts: &BTreeMap<u8, u64>| {
             let each = counts.iter().map(|(&vtk, count)| format!("{count} {}", kinds::name(vtk)));
             each.collect::<Vec<_>>().join(", ")
         };
         let mut notes = Vec::new();
         if let Some(array) = array {
-            if array.components > 1 {
-                notes.push(format!("the array has {} components; its magnitude is used", array.components));
+            if array.components > 1 && channel.is_none() {
+                notes.push(format!(
+                    "the array has {} components; its magnitude is used (a channel, 0 to {}, can be chosen)",
+                    array.components,
+                    array.components - 1
+                ));
             }
             if array.place == Place::Cells {
                 notes.push("the array lies on cells; its values are averaged to the points".to_owned());

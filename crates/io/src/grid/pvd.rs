@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::{GridFile, GridFormat, GridOptions, Part, format_of, join, pvtu, with_parts_of};
 use crate::bytes::load;
+use crate::choice::checked_step;
 use crate::error::{Problem, ReadError, quoted};
 use crate::vtk_xml::{Document, Element, XmlBytes};
 
@@ -34,10 +35,7 @@ impl TimeStep {
     /// # Errors
     /// As [`read_grid`](super::read_grid).
     pub fn read(&self, options: &GridOptions) -> Result<GridFile, ReadError> {
-        let joined = self.with_parts(|format, parts| {
-            let (grid, array, notes) = join::join(parts, options)?;
-            Ok(GridFile { grid, format, array, notes })
-        });
+        let joined = self.with_parts(|format, parts| join::join(format, parts, options));
         joined.map_err(|problem| match problem {
             Problem::Part { path, problem } => ReadError { path, problem: *problem },
             problem => ReadError { path: self.files.first().cloned().unwrap_or_default(), problem },
@@ -50,7 +48,9 @@ impl TimeStep {
     ) -> Result<R, Problem> {
         match &self.files[..] {
             [file] => {
-                let read = format_of(file).and_then(|format| with_parts_of(file, format, None, run));
+                let read = format_of(file).and_then(|format| {
+                    with_parts_of(file, format, None, |format, _, parts| run(format, parts))
+                });
                 read.map_err(|problem| problem.of_part(file))
             }
             files => pvtu::with_files(files, |parts| run(GridFormat::Pvtu, parts)),
@@ -61,14 +61,13 @@ impl TimeStep {
 /// Opens a time step of a collection, and runs something on its parts.
 pub(super) fn with_step<R>(
     path: &Path,
-    step: usize,
-    run: impl FnOnce(&[Part]) -> Result<R, Problem>,
+    step: Option<usize>,
+    run: impl FnOnce(u64, &[Part]) -> Result<R, Problem>,
 ) -> Result<R, Problem> {
     let mut steps = steps(path)?;
-    if step >= steps.len() {
-        return Err(Problem::field("time step asked for", step, format!("0 to {}", steps.len() - 1)));
-    }
-    steps.swap_remove(step).with_parts(|_, parts| run(parts))
+    let num_steps = steps.len() as u64;
+    let step = checked_step(num_steps, step)?.unwrap_or(0) as usize;
+    steps.swap_remove(step).with_parts(|_, parts| run(num_steps, parts))
 }
 
 fn steps(path: &Path) -> Result<Vec<TimeStep>, Problem> {

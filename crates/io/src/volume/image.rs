@@ -7,6 +7,7 @@ use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
+use crate::choice::checked_channel;
 use crate::error::Problem;
 
 /// One image; row 0 comes first, as in the file.
@@ -22,16 +23,12 @@ impl Page {
     /// One channel of a picture if that is asked for; the others have been read as the file has them.
     pub(super) fn channel(self, channel: Option<usize>) -> Result<Self, Problem> {
         let channels = self.sample.channels();
-        match channel {
-            None => Ok(self),
-            Some(channel) if channel >= channels => {
-                Err(Problem::field("channel asked for", channel, format!("0 to {}", channels - 1)))
-            }
-            Some(_) if channels == 1 => Ok(self),
-            Some(channel) => {
-                let bytes = self.bytes.chunks_exact(channels).map(|color| color[channel]).collect();
+        match checked_channel(channels as u64, channel)? {
+            Some(channel) if channels > 1 => {
+                let bytes = self.bytes.chunks_exact(channels).map(|color| color[channel as usize]).collect();
                 Ok(Self { sample: SampleType::U8, bytes, ..self })
             }
+            _ => Ok(self),
         }
     }
 }

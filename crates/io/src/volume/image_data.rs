@@ -124,6 +124,7 @@ impl<'a> ImageData<'a> {
         let mut decoded = Decoded::new(layout.dims, spacing, samples, notes);
         decoded.placement = Some(self.placement(&whole, on_cells));
         decoded.array = name;
+        decoded.choices.channels = chosen.components;
         Ok(decoded)
     }
 

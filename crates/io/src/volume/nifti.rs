@@ -274,6 +274,7 @@ impl Plan {
         };
         let Self { raster, spacing, scaling: _, notes } = self;
         let mut decoded = Decoded::new(raster.layout.dims, spacing, samples, notes);
+        decoded.choices = raster.choices;
         decoded.placement = header.placement;
         decoded.display_range = header.display_range;
         Ok(decoded)

@@ -72,6 +72,7 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Proble
     let placement = fields.placement(&space)?;
     let samples = fields.data(path, start, &axes)?.read(bytes, &raster, &mut notes)?;
     let mut decoded = Decoded::new(raster.layout.dims, spacing, samples, notes);
+    decoded.choices = raster.choices;
     decoded.placement = placement;
     Ok(decoded)
 }

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::{Decoded, compression_of_name, lower_name};
 use crate::bytes::{self, Compression, has_more, open_stream, read_samples, samples_at};
+use crate::choice::{checked_channel, wanted_volume};
 use crate::error::{Problem, quoted};
 use crate::layout::{Element, Layout, checked_spacing};
-use crate::raster::wanted_volume;
 use crate::volume::ReadOptions;
 
 pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Problem> {
@@ -21,10 +21,8 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Decoded, Proble
     };
     let layout = Layout::new("dims", dims, element.sample, element.order, options)?;
     let mut notes = Vec::new();
-    wanted_volume(1, options, &mut notes)?;
-    if let Some(channel) = options.channel.filter(|&channel| channel > 0) {
-        return Err(Problem::field("channel asked for", channel, "0: raw files have one"));
-    }
+    wanted_volume(1, options.time_step, &mut notes)?;
+    checked_channel(1, options.channel)?;
     let spacing = checked_spacing("spacing", [1.0; 3], layout.dims, options, &mut notes)?;
     let compression = compression_of_name(path);
     let expected = layout.num_bytes();

@@ -14,9 +14,9 @@ use super::image::{Page, decode_jpeg};
 use super::tiff::{self, Scale};
 use super::{Decoded, Format, foreign, lower_name, png};
 use crate::bytes::load;
+use crate::choice::wanted_volume;
 use crate::error::Problem;
 use crate::layout::{ByteOrder, Layout, checked_spacing, for_sample_type};
-use crate::raster::wanted_volume;
 use crate::volume::ReadOptions;
 
 pub(super) fn read_file(path: &Path, format: Format, options: &ReadOptions) -> Result<Decoded, Problem> {
@@ -144,7 +144,8 @@ impl<'a> Stack<'a> {
 
     /// Adds a picture, or the channel of it that is asked for; a file of one has one time.
     fn add_picture(&mut self, page: Page) -> Result<(), Problem> {
-        wanted_volume(1, self.options, &mut self.notes)?;
+        wanted_volume(1, self.options.time_step, &mut self.notes)?;
+        self.scale.choices.channels = page.sample.channels() as u64;
         self.add(page.channel(self.options.channel)?)
     }
 
@@ -178,6 +179,7 @@ impl<'a> Stack<'a> {
         let spacing = checked_spacing("spacing", spacing, layout.dims, self.options, &mut self.notes)?;
         let samples = self.values.finish();
         let mut decoded = Decoded::new(layout.dims, spacing, samples, self.notes);
+        decoded.choices = self.scale.choices;
         decoded.placement = self.scale.placement(layout.dims, spacing);
         Ok(decoded)
     }

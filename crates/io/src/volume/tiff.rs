@@ -10,11 +10,11 @@ use glam::{DMat3, DVec3};
 use volery_scene::SampleType;
 
 use super::image::{MAX_EXPANSION, Page, check_plausible};
+use crate::choice::{Choices, channel_note, checked_channel, wanted_volume};
 use crate::error::Problem;
 use crate::layout::ByteOrder;
 use crate::numbers::Scalar;
 use crate::orientation::Placement;
-use crate::raster::{channel_note, wanted_volume};
 use crate::volume::ReadOptions;
 
 mod decode;
@@ -34,6 +34,7 @@ const WHAT: &str = "the TIFF file";
 pub(super) struct Scale {
     /// Distances of columns, rows and slices; `None` if nothing is said.
     pub(super) spacing: Option<[f64; 3]>,
+    pub(super) choices: Choices,
     /// Which way rows and columns run: 1 down and to the right, as TIFF numbers it.
     pub(super) orientation: u64,
 }
@@ -75,11 +76,12 @@ pub(super) fn read_slices(
             take(decoded)?;
         }
     }
-    Ok(pages.scale(description.as_ref(), notes))
+    Ok(Scale { choices: selected.choices, ..pages.scale(description.as_ref(), notes) })
 }
 
 /// What is read of a file.
 struct Selected {
+    choices: Choices,
     slices: u64,
     channel: u64,
     time: u64,
@@ -156,18 +158,16 @@ impl<'a> Pages<'a> {
             Some(description) => self.is_behind(description)?,
             None => false,
         };
-        let time = wanted_volume(times, options, notes)?;
+        let time = wanted_volume(times, options.time_step, notes)?;
         let own_channels = if channels > 1 { channels } else { self.shape.channels() };
-        let wanted = options.channel.map(|channel| channel as u64);
-        if let Some(found) = wanted.filter(|&wanted| wanted >= own_channels) {
-            return Err(Problem::field("channel asked for", found, format!("0 to {}", own_channels - 1)));
-        }
+        let wanted = checked_channel(own_channels, options.channel)?;
         let of_pages = channels > 1;
         let is_colour = matches!(self.shape.take(None, &mut Vec::new()), Take::Color(_));
         if wanted.is_none() && own_channels > 1 && (of_pages || !is_colour) {
             notes.push(channel_note(0, own_channels));
         }
         Ok(Selected {
+            choices: Choices { channels: own_channels, time_steps: times },
             slices,
             channel: wanted.filter(|_| of_pages).unwrap_or(0),
             time,
@@ -325,7 +325,7 @@ impl<'a> Pages<'a> {
         if let (Some(unit), Some(_)) = (unit, spacing) {
             notes.push(format!("the spacing is in {unit}"));
         }
-        Scale { spacing, orientation }
+        Scale { spacing, orientation, choices: Choices::default() }
     }
 }
 

@@ -127,7 +127,7 @@ fn nrrd_axes_without_a_place_are_told_by_kind_direction_or_spacing() {
     assert_eq!((silent.grid.dims(), silent.notes.len()), ([2, 2, 2], 1));
     let times = read("kinds: domain domain time domain");
     assert_values(&times, &of_channel(0));
-    assert_eq!(times.notes, ["the file holds 2 volumes; the first is used"]);
+    assert_eq!(times.notes, ["the file holds 2 volumes; the first is used (another, 0 to 1, can be chosen)"]);
     let second = read_volume(&folder.path("a.nrrd"), &options(None, Some(1))).unwrap();
     assert_values(&second, &of_channel(1));
 }

@@ -40,10 +40,7 @@ fn channels_and_times_that_are_not_there_are_refused() {
     let path = folder.put("a_2x1x1_uint8.raw", [1, 2]);
     let options = |channel, time_step| ReadOptions { channel, time_step, ..ReadOptions::default() };
     assert!(volery_io::read_volume(&path, &options(Some(0), Some(0))).is_ok());
-    assert_eq!(
-        refuse(&path, &options(Some(1), None)),
-        "channel asked for is 1, expected 0: raw files have one"
-    );
+    assert_eq!(refuse(&path, &options(Some(1), None)), "channel asked for is 1, expected 0: there is one");
     assert_eq!(
         refuse(&path, &options(None, Some(1))),
         "time step asked for is 1, expected 0: the file holds one"

@@ -69,7 +69,10 @@ fn of_a_time_series_the_first_volume_is_read_and_said_so() {
     for (name, file) in [("a.nii", header.file(&bytes)), ("a.nii.gz", gzip(&header.file(&bytes)))] {
         let volume = folder.read(name, file);
         assert_volume(&volume, SampleType::I16, [1.0, 2.0, 0.5], &values(SampleType::I16));
-        assert_eq!(volume.notes, ["the file holds 8 volumes; the first is used"]);
+        assert_eq!(
+            volume.notes,
+            ["the file holds 8 volumes; the first is used (another, 0 to 7, can be chosen)"]
+        );
     }
 }
 

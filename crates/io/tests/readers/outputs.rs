@@ -1,7 +1,10 @@
 use std::io::{self, Write};
 
-use glam::DVec3;
-use volery_io::{ReadOptions, read_png_rgb, read_volume, write_atomically, write_exr, write_nrrd, write_png};
+use glam::{DAffine3, DMat3, DVec3};
+use volery_io::{
+    Orientation, ReadOptions, World, read_png_rgb, read_volume, write_atomically, write_exr, write_nrrd,
+    write_png,
+};
 use volery_scene::{SampleType, Samples, VoxelGrid};
 
 use crate::Folder;
@@ -71,7 +74,7 @@ fn nrrd_of_every_type_comes_back() {
     ];
     for samples in all {
         let grid = VoxelGrid::new([3, 2, 2], DVec3::new(0.1, 1e-9, 3e7), samples).unwrap();
-        write_nrrd(&path, &grid).unwrap();
+        write_nrrd(&path, &grid, World::Plain).unwrap();
         let volume = read_volume(&path, &ReadOptions::default()).unwrap();
         assert_eq!(volume.grid.sample_type(), grid.sample_type());
         assert_eq!((volume.grid.dims(), volume.grid.spacing()), (grid.dims(), grid.spacing()));
@@ -81,6 +84,34 @@ fn nrrd_of_every_type_comes_back() {
             }
         }
         assert!(volume.notes.is_empty());
+    }
+}
+
+#[test]
+fn nrrd_keeps_where_samples_lie() {
+    let folder = Folder::new();
+    let path = folder.path("a.nrrd");
+    let oblique = DMat3::from_rotation_z(0.3) * DMat3::from_diagonal(DVec3::new(-0.7, 1.3, 3.0));
+    let sheared = DMat3::from_cols(DVec3::Y * 2.0, DVec3::new(1e-3, 0.5, 0.0), DVec3::NEG_Z);
+    let plain = DMat3::from_diagonal(DVec3::new(1.0, 2.0, 0.3));
+    let samples: [Samples; 2] = [vec![7_i16; 12].into(), vec![[1_u8, 2, 3]; 12].into()];
+    for (axes, origin) in [
+        (oblique, DVec3::new(-90.1, 126.0, -1.0 / 3.0)),
+        (sheared, DVec3::ZERO),
+        (plain, DVec3::ZERO),
+        (plain, DVec3::new(1e-300, -4e9, 0.1)),
+    ] {
+        for (world, samples) in [World::Anatomical, World::Plain].into_iter().zip(&samples) {
+            let spacing = DVec3::from_array(axes.to_cols_array_2d().map(|axis| DVec3::from(axis).length()));
+            let placed = DAffine3::from_mat3_translation(axes, origin);
+            let grid = VoxelGrid::new([3, 2, 2], spacing, samples.clone()).unwrap();
+            let grid = grid.with_world_from_index(placed).unwrap();
+            write_nrrd(&path, &grid, world).unwrap();
+            let volume = read_volume(&path, &ReadOptions::default()).unwrap();
+            assert_eq!((volume.grid.world_from_index(), volume.world), (placed, world));
+            assert_eq!((volume.grid.spacing(), volume.grid.sample_type()), (spacing, grid.sample_type()));
+            assert_eq!(volume.orientation(), Orientation::of(&placed, world));
+        }
     }
 }
 

@@ -52,7 +52,12 @@ fn steps_ascend_and_each_has_its_own_values() {
         assert!(is_grid(&path));
         let first = read_grid(&path, &GridOptions::default()).unwrap();
         assert_eq!((first.format, second(&first)), (GridFormat::Pvd, -2.0));
-        assert!(first.notes.iter().any(|note| note.contains("the first is read")), "{:?}", first.notes);
+        assert!(
+            first.notes.iter().any(|note| note
+                .contains("the file holds 2 time steps; the first is used (another, 0 to 1, can be chosen)")),
+            "{:?}",
+            first.notes
+        );
     }
 }
 

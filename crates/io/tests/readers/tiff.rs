@@ -54,7 +54,7 @@ fn slices_channels_and_times_are_told_apart() {
         assert_eq!(
             volume.notes,
             [
-                "the file holds 2 volumes; the first is used",
+                "the file holds 2 volumes; the first is used (another, 0 to 1, can be chosen)",
                 "channel 0 of 3 is used (another one, 0 to 2, can be chosen)"
             ]
         );

@@ -130,7 +130,7 @@ fn areas_times_distance_are_the_volume_in_every_pattern() {
 fn lines_through_collapsed_cells_are_those_through_their_tetrahedra() {
     for cell_type in CellType::ALL {
         let mut random = Random(42);
-        let (mut worst, mut num_off, mut num_cells, mut num_met) = (0.0_f64, 0, 0, 0);
+        let (mut worst, mut num_cells, mut num_met) = (0.0_f64, 0, 0);
         for pattern in patterns(cell_type.num_nodes()) {
             let parts = cell(cell_type, &pattern, 0.08, &mut random);
             let Some(tetrahedra) = tetrahedra(&parts) else { continue };
@@ -144,15 +144,12 @@ fn lines_through_collapsed_cells_are_those_through_their_tetrahedra() {
                 off = off.max((found - expected).abs());
                 num_met += usize::from(expected > 0.0);
             }
-            // A section of one polygon inside another, the other way round, is not cut open.
             if off > 5e-6 {
                 println!("{cell_type} {pattern:?} is off by {off:.1e}");
-                num_off += 1;
-            } else {
-                worst = worst.max(off);
             }
+            worst = worst.max(off);
         }
-        println!("{cell_type}: {num_cells} cells, {num_met} lines, {num_off} off, the others by {worst:.1e}");
+        println!("{cell_type}: {num_cells} cells, {num_met} lines, off by {worst:.1e} (limit 5e-6)");
         let least = match cell_type {
             CellType::Tetrahedron => 1,
             CellType::Pyramid => 5,
@@ -160,7 +157,7 @@ fn lines_through_collapsed_cells_are_those_through_their_tetrahedra() {
             _ => 100,
         };
         assert!(num_cells >= least && num_met > num_cells, "{num_cells} {num_met}");
-        assert!(num_off * 1000 <= num_cells, "{cell_type}: {num_off} of {num_cells} cells");
+        assert!(worst <= 5e-6, "{cell_type}: {worst:e}");
     }
 }
 

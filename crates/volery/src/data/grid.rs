@@ -17,10 +17,10 @@ use volery_scene::{CellType, Samples, TransferFunction, UnstructuredGrid};
 use volery_slicing::{Slicer, node_gradients};
 
 use super::Data;
-use crate::report;
 use crate::technique::{Technique, stack};
 use crate::transfer::Preset;
 use crate::view::{How, StackView};
+use crate::{histogram, report};
 
 pub use error::GridError;
 pub use slices::{SliceCounts, Slices, SlicesError};
@@ -152,13 +152,13 @@ impl Data for GridData {
         self.shape.world_bounds
     }
 
-    /// From the values at the nodes of cells that hold matter.
+    /// From the values in cells that hold matter, by their volume.
     ///
     /// # Panics
     /// Never: making it ready found finite values and their range.
     fn preset_over(&self, preset: Preset, range: Option<[f64; 2]>) -> TransferFunction {
-        let used = values::of_used_nodes(self.with_matter(), &self.values);
-        let transfer = preset.over(&used, range, self.extent());
+        let samples = histogram::by_volume(self.with_matter(), &self.values);
+        let transfer = preset.over(&samples, range, self.extent());
         transfer.expect("making it ready found finite values and their range")
     }
 
@@ -175,6 +175,7 @@ impl Data for GridData {
             dims: None,
             cells: Some(cells.collect()),
             scalar: self.values.sample_type().name(),
+            place: None,
         }
     }
 

@@ -96,7 +96,7 @@ impl Data for StackData {
     }
 
     fn input(&self) -> report::Input {
-        report::Input { path: None, kind: "stack", dims: None, cells: None, scalar: "u16" }
+        report::Input { path: None, kind: "stack", dims: None, cells: None, scalar: "u16", place: None }
     }
 
     fn build_seconds(&self) -> f64 {

@@ -186,6 +186,7 @@ impl Data for VolumeData {
             dims: Some(dims),
             cells: None,
             scalar: self.sample_type().name(),
+            place: None,
         }
     }
 

@@ -9,7 +9,7 @@ use volery_io::grid::{ArrayRange, GridArray, read_array_ranges};
 use volery_io::{GridFile, GridOptions, ReadError, read_grid};
 use volery_scene::CellType;
 
-use super::number;
+use super::{Choices, number};
 
 /// What a grid file holds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -32,6 +32,9 @@ pub struct GridInfo {
     /// Name of the array that is drawn unless another one is asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub array: Option<String>,
+    /// Which of several is drawn, where there are several.
+    #[serde(skip_serializing_if = "Choices::is_empty")]
+    pub choices: Choices,
     /// What is wrong with cells, by fault and type.
     pub defects: Vec<DefectInfo>,
     /// What the reader decided, a sentence each.
@@ -49,8 +52,10 @@ pub struct ArrayInfo {
     pub components: usize,
     /// Type of a number: `f32`, `i64`, ...
     pub scalar: &'static str,
-    /// Smallest and largest finite value, of the magnitude where there are several components; missing if
-    /// there is none.
+    /// Which of several components the range is of; missing for their magnitude.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<usize>,
+    /// Smallest and largest finite value; missing if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<[f64; 2]>,
     /// Values that are NaN or infinite.
@@ -81,15 +86,16 @@ impl GridInfo {
     /// # Errors
     /// When the file cannot be read as a grid.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
-        Self::of(path, read_grid(path, &GridOptions::default())?)
+        let options = GridOptions::default();
+        Self::of(path, read_grid(path, &options)?, &options)
     }
 
-    /// Looks at every array of a file and every cell of the grid that was read from it.
+    /// Looks at every array of a file and every cell of the grid that was read from it by these options.
     ///
     /// # Errors
     /// When an array of the file cannot be read.
-    pub fn of(path: &Path, file: GridFile) -> Result<Self, ReadError> {
-        let arrays = read_array_ranges(path, &GridOptions::default())?.into_iter().map(ArrayInfo::from);
+    pub fn of(path: &Path, file: GridFile, options: &GridOptions) -> Result<Self, ReadError> {
+        let arrays = read_array_ranges(path, options)?.into_iter().map(ArrayInfo::from);
         let grid = &file.grid;
         let cells = CellType::ALL.iter().zip(grid.cells().count_by_type());
         let cells = cells.filter(|(_, count)| *count > 0).map(|(cell_type, count)| (cell_type.name(), count));
@@ -102,6 +108,7 @@ impl GridInfo {
             bounds: grid.world_bounds().map(|bounds| bounds.map(|corner| corner.to_array())),
             arrays: arrays.collect(),
             array: file.array.map(|array| array.name),
+            choices: file.choices.into(),
             defects: defects(grid),
             notes: file.notes,
         })
@@ -125,9 +132,9 @@ fn defects(grid: &volery_scene::UnstructuredGrid) -> Vec<DefectInfo> {
 }
 
 impl From<ArrayRange> for ArrayInfo {
-    fn from(ArrayRange { array, range, blank, problem }: ArrayRange) -> Self {
+    fn from(ArrayRange { array, channel, range, blank, problem }: ArrayRange) -> Self {
         let GridArray { name, place, components, scalar } = array;
-        Self { name, place: place.to_string(), components, scalar, range, blank, problem }
+        Self { name, place: place.to_string(), components, scalar, channel, range, blank, problem }
     }
 }
 
@@ -155,8 +162,12 @@ impl fmt::Display for GridInfo {
             match (array.range, &array.problem) {
                 (_, Some(problem)) => write!(f, ", cannot be read: {problem}")?,
                 (Some([low, high]), None) => {
-                    let what = if array.components > 1 { ", magnitude " } else { ", " };
-                    write!(f, "{what}{} to {}", number(low), number(high))?;
+                    let what = match array.channel {
+                        Some(channel) => format!("channel {channel} "),
+                        None if array.components > 1 => "magnitude ".to_owned(),
+                        None => String::new(),
+                    };
+                    write!(f, ", {what}{} to {}", number(low), number(high))?;
                 }
                 (None, None) => write!(f, ", no finite value")?,
             }
@@ -165,6 +176,7 @@ impl fmt::Display for GridInfo {
             }
             writeln!(f, "{}", if self.array.as_ref() == Some(&array.name) { " (drawn)" } else { "" })?;
         }
+        write!(f, "{}", self.choices)?;
         for DefectInfo { fault, cell_type, cells, count, first_cell } in &self.defects {
             let times = if count > cells { format!(", {count} times") } else { String::new() };
             writeln!(f, "defect    {fault}: {cells} {cell_type}{times}, first cell {first_cell}")?;

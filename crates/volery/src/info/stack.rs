@@ -35,7 +35,11 @@ impl StackInfo {
         Self {
             kind: "stack",
             normal: mesh.normal.to_array(),
-            slices: mesh.sheets.iter().filter(|sheet| sheet.thickness[1] == 0.0).count(),
+            slices: mesh
+                .sheets
+                .iter()
+                .filter(|sheet| sheet.thickness[1] == 0.0 && sheet.thickness[0] > 0.0)
+                .count(),
             vertices: mesh.points.len(),
             triangles: mesh.triangles.len(),
             bytes: mesh.num_bytes(),

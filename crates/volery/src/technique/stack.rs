@@ -84,7 +84,11 @@ impl Technique<GridData> for OfGrid {
     }
 
     fn view(&self, grid: &GridData, options: &ViewOptions, how: How) -> View {
-        view(grid, options, options.direction.unwrap_or_default(), how)
+        let boxes = |transfer: &Transfer| match transfer {
+            Transfer::Values(function) => fit::visible_cells(grid.with_matter(), grid.values(), function),
+            Transfer::Magnitudes(_) => vec![grid.world_bounds()],
+        };
+        view(grid, options, options.direction.unwrap_or_default(), how, boxes)
     }
 
     fn check(&self, _: &GridData, view: &View) -> Result<(), RenderError> {
@@ -140,7 +144,7 @@ impl Technique<StackData> for OfStack {
     /// Straight at the slices where the options have no direction: seen from the side, slices are lines.
     fn view(&self, stack: &StackData, options: &ViewOptions, how: How) -> View {
         let direction = options.direction.unwrap_or_else(|| Direction::facing(stack.stack().normal()));
-        view(stack, options, direction, how)
+        view(stack, options, direction, how, |_| vec![stack.world_bounds()])
     }
 
     fn check(&self, stack: &StackData, view: &View) -> Result<(), RenderError> {
@@ -193,11 +197,17 @@ impl View {
     }
 }
 
-/// A view of all of a box.
-fn view<D: Data>(data: &D, options: &ViewOptions, direction: Direction, how: How) -> View {
-    let bounds = [data.world_bounds()];
-    let camera = fit::camera(&bounds, direction, options.orthographic, options.aspect());
-    options.view(camera, options.transfer_or(|| data.preset_over(Preset::Auto, options.range)), how)
+/// A view of all of the boxes that can be seen.
+fn view<D: Data>(
+    data: &D,
+    options: &ViewOptions,
+    direction: Direction,
+    how: How,
+    boxes: impl FnOnce(&Transfer) -> Vec<[DVec3; 2]>,
+) -> View {
+    let transfer = options.transfer_or(|| data.preset_over(Preset::Auto, options.range));
+    let camera = fit::camera(&boxes(&transfer), direction, options.orthographic, options.aspect());
+    options.view(camera, transfer, how)
 }
 
 /// The plan of a stack, with the values of `range`.

@@ -1,0 +1,176 @@
+//! More small inputs made after public reports: grids with arrays or cells that other programs stumble over, and steps
+//! of a transfer function at a value that many samples have.
+
+mod common;
+
+use common::{Workshop, head};
+use serde_json::json;
+use volery::VoxelGrid;
+use volery::glam::DVec3;
+
+const POINTS: &str = "0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1";
+
+/// One hexahedron in VTK's XML, with an array p of 0 to 7 and this beside it.
+fn vtu(beside: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\"?><VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\">\
+         <UnstructuredGrid><Piece NumberOfPoints=\"8\" NumberOfCells=\"1\"><PointData>\
+         <DataArray type=\"Float32\" Name=\"p\" format=\"ascii\">0 1 2 3 4 5 6 7</DataArray>{beside}</PointData>\
+         <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{POINTS}</DataArray></Points>\
+         <Cells><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2 3 4 5 6 7</DataArray>\
+         <DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">8</DataArray>\
+         <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">12</DataArray></Cells>\
+         </Piece></UnstructuredGrid></VTKFile>"
+    )
+}
+
+#[test]
+fn b3_vtu_other_arrays_refuse_nothing() {
+    let shop = Workshop::new();
+    shop.write("alone.vtu", vtu(""));
+    shop.done("render alone.vtu -o alone.png --size 24x24");
+    let array = |attributes: &str, numbers: &str| {
+        format!("<DataArray {attributes} format=\"ascii\">{numbers}</DataArray>")
+    };
+    for (beside, said) in [
+        (array("type=\"Bit\" Name=\"set\"", "0 1 0 1 0 1 0 1"), "array left out: set"),
+        (array("type=\"String\" Name=\"label\"", "97 0 98 0"), "array left out: label"),
+        (array("type=\"Float32\" Name=\"none\" NumberOfComponents=\"0\"", ""), "array left out: none"),
+        (
+            array("type=\"Float32\" Name=\"e\" NumberOfComponents=\"\"", "0 1 2 3 4 5 6 7"),
+            "array     e on points: f32, 0 to 7",
+        ),
+        (
+            array("type=\"Float32\" Name=\"short\"", "0 1 2"),
+            "cannot be read: short: count of numbers in the array is 3, expected 8",
+        ),
+    ] {
+        shop.write("a.vtu", vtu(&beside));
+        let info = shop.done("info a.vtu").stdout;
+        assert!(info.contains("cells     1 hexahedron\n"), "{info}");
+        assert!(
+            info.contains("array     p on points: f32, 0 to 7 (drawn)\n") && info.contains(said),
+            "{info}"
+        );
+        shop.done("render a.vtu -o a.png --size 24x24");
+        assert!(shop.bytes("a.png") == shop.bytes("alone.png"), "{said}");
+    }
+    // What is asked for by name says why it cannot be had.
+    shop.write("a.vtu", vtu(&array("type=\"Bit\" Name=\"set\"", "0 1 0 1 0 1 0 1")));
+    shop.run_line("render a.vtu -o b.png --array set").fails(1, &["a.vtu", "set", "'Bit'"]);
+}
+
+#[test]
+fn b4_legacy_component_names_may_be_blank() {
+    let shop = Workshop::new();
+    let file = |names: &str| {
+        let vectors: Vec<String> = (0..8).map(|i| format!("{i} {} 2", 2 * i)).collect();
+        format!(
+            "# vtk DataFile Version 4.2\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n{POINTS}\nCELLS 1 9\n\
+             8 0 1 2 3 4 5 6 7\nCELL_TYPES 1\n12\nPOINT_DATA 8\nSCALARS p float\nLOOKUP_TABLE default\n\
+             0 1 2 3 4 5 6 7\nFIELD FieldData 2\nvel 3 8 float\n{}\n{names}ids 1 8 int\n9 1 2 3 4 5 6 7\n",
+            vectors.join(" ")
+        )
+    };
+    for names in [
+        "",
+        "METADATA\nCOMPONENT_NAMES\nNAME\n\n\n\n",
+        "METADATA\nCOMPONENT_NAMES\n\nNAME\n\n\n",
+        "METADATA\nCOMPONENT_NAMES\n\n\n\n\n",
+    ] {
+        shop.write("a.vtk", file(names));
+        let info = shop.done("info a.vtk").stdout;
+        assert!(info.contains("cells     1 hexahedron\n"), "{names:?}: {info}");
+        assert!(info.contains("array     p on points: f32, 0 to 7 (drawn)\n"), "{names:?}: {info}");
+        assert!(info.contains("array     vel on points: 3 x f32, magnitude 2 to "), "{names:?}: {info}");
+        assert!(info.contains("array     ids on points: i32, 1 to 9\n"), "{names:?}: {info}");
+        shop.done("render a.vtk -o a.png --size 24x24 --array vel --component 1");
+    }
+}
+
+/// Cells that list nodes more than once are sliced into files, and drawn as the exact picture has them.
+#[test]
+fn b1_slice_degenerate_cells() {
+    let shop = Workshop::new();
+    let file = |vtk: u8, nodes: &[usize]| {
+        let list: Vec<String> = nodes.iter().map(usize::to_string).collect();
+        format!(
+            "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n{POINTS}\nCELLS 1 {}\n\
+             {} {}\nCELL_TYPES 1\n{vtk}\nPOINT_DATA 8\nSCALARS p double\nLOOKUP_TABLE default\n0 1 2 3 4 5 6 7\n",
+            nodes.len() + 1,
+            nodes.len(),
+            list.join(" ")
+        )
+    };
+    let cells: [(u8, &[usize]); 9] = [
+        (12, &[0, 1, 2, 3, 4, 4, 4, 4]),
+        (12, &[0, 1, 2, 2, 4, 5, 6, 6]),
+        (12, &[0, 1, 2, 3, 4, 5, 2, 3]),
+        (12, &[0, 1, 2, 2, 4, 4, 4, 4]),
+        // A section of one polygon in another.
+        (12, &[0, 1, 2, 3, 4, 5, 0, 4]),
+        (13, &[0, 1, 3, 4, 5, 4]),
+        (13, &[0, 1, 3, 0, 5, 7]),
+        (14, &[0, 1, 2, 2, 4]),
+        (14, &[0, 1, 1, 3, 4]),
+    ];
+    let haze = r#"{"points": [{"value": 0, "color": [0.9, 0.5, 0.1], "opacity": 0.6}], "unit_distance": 1}"#;
+    shop.write("haze.json", haze);
+    for (vtk, nodes) in cells {
+        shop.write("a.vtk", file(vtk, nodes));
+        for axis in ["x", "y", "z", "0.3,0.5,0.81"] {
+            for output in ["a.vsl", "a.glb"] {
+                shop.done(&format!("slice a.vtk -o {output} --count 7 --axis {axis}"));
+            }
+        }
+        let line =
+            "render a.vtk -o a.png --size 32x32 --slices 300 --transfer haze.json --verify --report r.json";
+        shop.done(line);
+        let rmse = shop.json("r.json")["error"]["measured_rmse"].as_f64().expect("an error");
+        println!("{vtk} {nodes:?}: rmse {rmse:.5} (limit 0.005)");
+        assert!(rmse < 0.005, "{vtk} {nodes:?}: {rmse}");
+    }
+}
+
+#[test]
+fn a9_render_step_at_value_is_exact() {
+    let shop = Workshop::new();
+    // Labels in blocks; the step is at the value of one of them.
+    let label = |i: usize| [0_u8, 1, 100, 200][(i % 16 / 8) + 2 * (i / 16 % 16 / 8)];
+    let samples: Vec<u8> = (0..16 * 16 * 16).map(label).collect();
+    let labels = VoxelGrid::new([16, 16, 16], DVec3::new(1.0, 0.7, 1.3), samples).expect("a grid");
+    shop.write_volume("labels.nrrd", &labels);
+    for value in [1, 100, 200] {
+        let point =
+            |level: f64| json!({"value": value, "color": [level, 0.5, 1.0 - level], "opacity": 0.9 * level});
+        let transfer = json!({"points": [point(0.0), point(1.0)], "unit_distance": 1.0});
+        shop.write("step.json", transfer.to_string());
+        for technique in ["plane", "raycast"] {
+            shop.done(&format!(
+                "render labels.nrrd -o a.png --technique {technique} --transfer step.json --size 80x80 --backend software \
+                 --verify --report r.json"
+            ));
+            let most = shop.json("r.json")["error"]["measured_max"].as_f64().expect("an error");
+            let limit = if technique == "plane" { 0.002 } else { 0.01 };
+            println!("{technique} at {value}: {most:.5} (limit {limit})");
+            assert!(most < limit, "{technique} at {value}: {most}");
+        }
+    }
+}
+
+/// A1 at the command line: left and right never change sides in silence.
+#[test]
+fn a1_orientation_is_said_by_render_and_info() {
+    let shop = Workshop::new();
+    let grid = head();
+    let mut flipped = volery::glam::DAffine3::from_scale(grid.spacing());
+    flipped.matrix3.x_axis = -flipped.matrix3.x_axis;
+    let placed = grid.with_world_from_index(flipped).expect("axes that span space");
+    volery::io::write_nrrd(&shop.path("las.nrrd"), &placed, volery::io::World::Anatomical).expect("a volume");
+    let note = "the axes of the samples run to LAS; pictures are drawn along them, and so mirrored: left and right \
+                change sides";
+    let said = shop.done("render las.nrrd -o a.png --size 24x24").stdout;
+    assert!(said.contains(&format!("note: {note}\n")), "{said}");
+    let info = shop.done("info las.nrrd").stdout;
+    assert!(info.contains("axes      LAS\n") && info.contains(note), "{info}");
+}
