@@ -5,7 +5,7 @@
 //! | u8, i8 | U8 | none |
 //! | u16, i16 | U16 | none |
 //! | RGB, RGBA | Rgba8, opaque where there is no fourth channel | none |
-//! | u32, i32, f32, f64 | F32, from 0 to at most 1 over a window of values | at most 2^-24 of the window in it, 2^-24 of the distance from its start beyond |
+//! | u32, i32, f32, f64 | F32, from 0 to at most 1.25 over a window of values | at most 2^-24 of the window in it, 2^-24 of the distance from its start beyond |
 //!
 //! Relative to a window, since `f32` texels near 1e6 would leave nothing of a range of 1. The window is the range of
 //! finite values, or that part of it in which the transfer function changes where this is much smaller: one outlier, or
@@ -48,7 +48,7 @@ impl Encoding {
     }
 
     /// The encoding that suits a transfer function: this one where its digits are enough, else one for the values at
-    /// which colour or opacity change. `range` is that of the volume.
+    /// which colour or opacity change, the same for most that differ little. `range` is that of the volume.
     pub(crate) fn suiting(&self, transfer: &TransferFunction, range: [f64; 2]) -> Self {
         let points = transfer.points();
         let [low, high] =
@@ -58,7 +58,9 @@ impl Encoding {
         if self.texel != TexelType::F32 || width <= 0.0 || reach.max(self.scale) <= MAX_WINDOW * width {
             return *self;
         }
-        self.over([low, high])
+        let window = self.over([low, high]);
+        let step = window.scale / 4.0;
+        Self { offset: (low / step).floor() * step, ..window }
     }
 
     /// Texels from 0 to at most 1 over a window. In units of a power of two, and from a whole number where the window is

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use glam::DVec3;
 use volery::io::{GlbOptions, GridOptions, read_grid, read_stack};
-use volery::{BackendChoice, InputData, Slices, open_backend};
+use volery::{BackendChoice, How, InputData, Slices, View, open_backend};
 use volery_slicing::QuantizedMesh;
 use volery_tests::{Drawer, at_most, data_folder, distance, exact, read_scene, stack_of, view_of};
 
@@ -66,7 +66,10 @@ fn a_file_changes_the_picture_little() {
         let path = folder.path().join("a.vsl");
         session.data().slices(forward, 256).unwrap().write_vsl(&path).unwrap();
         let mut stack = Drawer::stack(read_stack(&path, MAX_BYTES).unwrap(), software()).unwrap();
-        let from_file = stack.render_frames(&view, 1).unwrap().image;
+        let from_file = stack
+            .render_frames(&View { how: How::Slices { is_lit: false }, ..view.clone() }, 1)
+            .unwrap()
+            .image;
         let what = format!("{name}: from a file against as sliced");
         let found = distance(&what, &exact(&sliced), &exact(&from_file));
         at_most(&what, found.rmse, 0.0002);

@@ -186,9 +186,9 @@ fn the_number_of_threads_does_not_change_a_bit_of_real_data() {
 #[test]
 fn a_volume_of_one_sample_along_an_axis_is_refused_in_one_line() {
     for dims in [[1, 1, 1], [1, 1, 9], [5, 1, 7]] {
-        let opened =
-            Drawer::volume(volery_data::noise(dims, 1), Box::new(SoftwareBackend::new()), How::Raycast);
-        let Err(error) = opened else { panic!("{dims:?} was opened") };
+        let mut session = software(volery_data::noise(dims, 1));
+        let view = whole_view(&session);
+        let Err(error) = session.render(&view) else { panic!("{dims:?} was drawn") };
         assert!(error.to_string().contains("at least 2"), "{error}");
     }
 }

@@ -111,7 +111,9 @@ impl VolumeData {
     /// How bricks are stored from now on: as a transfer function asks. Where that changes, it is another volume to a
     /// backend.
     pub(crate) fn store_for(&mut self, transfer: &TransferFunction) -> Store {
-        let encoding = self.store.encoding.suiting(transfer, self.store.layout.value_range);
+        let range = self.store.layout.value_range;
+        // Of the transfer function alone: pictures do not depend on those before.
+        let encoding = Encoding::new(self.sample_type(), range).suiting(transfer, range);
         if encoding != self.store.encoding {
             let layout = VolumeLayout {
                 revision: Revision::new(),

@@ -12,6 +12,9 @@ use volery_tests::{Drawer, Unblended, at_most, backend, data_folder, distance, d
 
 use super::read;
 
+/// Samples between the corners of bricks.
+const BRICK: i32 = volery::data::BRICK_CELLS as i32;
+
 fn view(session: &Drawer<VolumeData>, side: u32) -> View {
     session.view(&ViewOptions { width: side, height: side, ..ViewOptions::default() })
 }
@@ -88,14 +91,14 @@ fn a_focus_in_an_image_leaves_no_seam() {
     let test = "a_focus_in_an_image_leaves_no_seam";
     let Some(data) = data_folder(test) else { return };
     let grid = read(&data, "mandrill_512.png");
-    let cells = volery::data::BRICK_CELLS as f64;
+    let cells = f64::from(BRICK);
     let threshold = (1.0 + 1.0 / cells) / 10.0 + 1e-5;
     let steepest_of = |backend: Box<dyn Backend>| {
         let mut session = Drawer::volume(grid.clone(), backend, How::Planes(PlaneView::default())).unwrap();
         let mut view = view(&session, 300);
         planes_of(&mut view).focus = Some(Focus { point: DVec3::new(200.0, 170.0, 0.0), quality: 0.5 });
         let mut largest = 0.0_f64;
-        for [x, y] in (1..16).flat_map(|j| (1..16).map(move |i| [30 * i, 30 * j])) {
+        for [x, y] in (1..16).flat_map(|j| (1..16).map(move |i| [BRICK * i, BRICK * j])) {
             let target = DVec3::new(f64::from(x), f64::from(y), 0.0);
             let projection = Projection::Orthographic { height: 30.0 };
             view.camera = Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection };
