@@ -17,7 +17,6 @@ pub struct Choices {
 
 impl Choices {
     /// Whether there is nothing to choose.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
     pub(super) fn is_empty(&self) -> bool {
         *self == Self::default()
     }
