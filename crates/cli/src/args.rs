@@ -92,7 +92,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "NAME", requires = "transfer")]
     pub(crate) color_map: Option<String>,
     /// Values over which automatic colours and colour maps run; those beyond have the colours of the ends
-    /// [default: the scene's, else most of the values, without what stands for no data]
+    /// [default: the scene's, else those that the file asks to show (cal_min and cal_max of NIfTI), else most of the
+    /// values, without what stands for no data]
     #[arg(long, value_name = "LOW,HIGH", value_parser = parse_range, allow_hyphen_values = true)]
     pub(crate) range: Option<[f64; 2]>,
     /// Linear colour behind everything, each number from 0 to 1 [default: the scene's, else nearly black]

@@ -348,7 +348,8 @@ impl Stack {
 
     /// How many planes met cells.
     fn num_slices(&self) -> usize {
-        self.mesh.sheets.iter().filter(|sheet| sheet.thickness[1] == 0.0).count()
+        let is_slice = |sheet: &&MeshSheet| sheet.thickness[1] == 0.0 && sheet.thickness[0] > 0.0;
+        self.mesh.sheets.iter().filter(is_slice).count()
     }
 
     /// Bytes of vertices and triangles.
