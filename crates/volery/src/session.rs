@@ -17,8 +17,8 @@ use std::time::Instant;
 
 use glam::DVec3;
 use volery_frame::{
-    Backend, Content, Cubes, Drawn, Frame, Image, Planes, PointTransfer, RayTransfer, Rays, Thickness,
-    VolumeLayout,
+    Backend, Content, Cubes, Drawn, Frame, Image, PictureView, Planes, PointTransfer, RayTransfer, Rays,
+    Thickness, VolumeLayout,
 };
 use volery_pyramid::{CubeTree, Kind, Node, NodeSource, Pyramid};
 use volery_reference::{PlaneScene, Tracer};
@@ -338,17 +338,16 @@ impl Session {
                     shows_bricks: view.planes.shows_nodes,
                 })
             }
-            Plan::Cubes(plan) => Content::Cubes(Cubes { cubes: &plan.cubes, thickness: view.thickness }),
+            Plan::Cubes(plan) => Content::Cubes(Cubes { revision: None, cubes: &plan.cubes, thickness: view.thickness }),
         };
-        let frame = Frame {
+        let picture = PictureView {
             width: view.width,
             height: view.height,
             camera: view.camera,
             background: view.background.map(|c| c as f32),
             meshes: &view.meshes,
-            content,
         };
-        Ok(self.backend.draw(&frame)?)
+        Ok(self.backend.draw(&Frame { view: picture, content })?)
     }
 
     /// Compares a picture of this volume with the truth: the exact picture in `f64` of the full-resolution

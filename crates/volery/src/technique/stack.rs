@@ -24,8 +24,8 @@ use std::time::Instant;
 
 use glam::DVec3;
 use volery_frame::{
-    Backend, Content, Device, DrawError, Frame, Image, Light, Quantization, Sheet, SheetTransfer,
-    SheetVertices, Sheets, Thickness,
+    Backend, Content, Device, DrawError, Frame, Image, Light, PictureView, Quantization, Revision, Sheet,
+    SheetTransfer, SheetVertices, Sheets, Thickness,
 };
 use volery_scene::{Camera, Projection, Samples, TransferFunction, TransferFunction2d};
 use volery_slicing::{MeshSheet, Planes, QuantizedMesh, Rays, Refinement, SliceMesh, Slicer, error};
@@ -146,9 +146,9 @@ pub(crate) struct Stack {
     /// The rays that its strips are in order for.
     rays: Rays,
     /// Names the contents of the mesh.
-    revision: u64,
+    revision: Revision,
     /// The revision that was drawn last.
-    sent: Option<u64>,
+    sent: Option<Revision>,
 }
 
 impl Recipe {
@@ -183,7 +183,7 @@ impl Stack {
     /// Of a mesh whose strips are in order for rays along its normal.
     fn new(mesh: SliceMesh, quantized: Option<QuantizedMesh>) -> Self {
         let unordered = (mesh.triangles.clone(), mesh.sheets.clone());
-        let (rays, revision) = (Rays::Along(mesh.normal), Sheets::next_revision());
+        let (rays, revision) = (Rays::Along(mesh.normal), Revision::new());
         Self { mesh, quantized, unordered, rays, revision, sent: None }
     }
 
@@ -216,7 +216,7 @@ impl Stack {
         if self.quantized.is_some() {
             self.quantized = Some(QuantizedMesh::new(&self.mesh)?);
         }
-        self.revision = Sheets::next_revision();
+        self.revision = Revision::new();
         Ok(())
     }
 
@@ -230,7 +230,7 @@ impl Stack {
             self.mesh.triangles.copy_from_slice(&self.unordered.0);
             self.mesh.sheets.clone_from(&self.unordered.1);
             self.mesh.orient_strips(rays);
-            (self.rays, self.revision) = (rays, Sheets::next_revision());
+            (self.rays, self.revision) = (rays, Revision::new());
         }
     }
 
@@ -244,7 +244,7 @@ impl Stack {
         let sheets = self.sheets(&view.camera);
         let SliceMesh { normal, origin, points, gradients, triangles, .. } = &self.mesh;
         let content = Sheets {
-            revision: self.revision,
+            revision: Some(self.revision),
             normal: *normal,
             origin: *origin,
             vertices: match &self.quantized {
@@ -256,15 +256,14 @@ impl Stack {
             transfer,
             light: view.stack.light(&view.camera),
         };
-        let frame = Frame {
+        let picture = PictureView {
             width: view.width,
             height: view.height,
             camera: view.camera,
             background: view.background.map(|c| c as f32),
             meshes: &view.meshes,
-            content: Content::Sheets(content),
         };
-        let image = backend.draw(&frame)?.image;
+        let image = backend.draw(&Frame { view: picture, content: Content::Sheets(content) })?.image;
         let is_new = self.sent.replace(self.revision) != Some(self.revision);
         Ok((image, if is_new { self.num_bytes() } else { 0 }))
     }

@@ -1,7 +1,9 @@
 //! Cubes beyond the limits of one buffer and of one texture: the suite's own pictures are small.
 
 use volery_frame::conformance::Property;
-use volery_frame::{Backend, Content, Cube, Cubes, Frame, Image, TexelType, Thickness, VolumeLayout};
+use volery_frame::{
+    Backend, Content, Cube, Cubes, Frame, Image, PictureView, TexelType, Thickness, VolumeLayout,
+};
 use volery_scene::{Camera, Projection};
 
 use super::difference;
@@ -31,8 +33,9 @@ fn draw(
         value_range: [0.0, 255.0],
     };
     backend.set_volume(&layout).expect("no brick is needed");
-    let content = Content::Cubes(Cubes { cubes, thickness: Thickness::Exact });
-    let frame = Frame { width, height, camera, background: [0.25; 3], meshes: &[], content };
+    let content = Content::Cubes(Cubes { revision: None, cubes, thickness: Thickness::Exact });
+    let frame =
+        Frame { view: PictureView { width, height, camera, background: [0.25; 3], meshes: &[] }, content };
     backend.draw(&frame).expect("cubes need no brick").image
 }
 
