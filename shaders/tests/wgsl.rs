@@ -48,8 +48,8 @@ fn reflection_says_what_the_file_says() {
     assert_eq!(size_of::<raycast::Frame>() % 16, 0);
     let numbers: Vec<_> = raycast::BINDINGS.iter().map(|b| (b.group, b.binding)).collect();
     assert_eq!(numbers, (0..numbers.len() as u32).map(|i| (0, i)).collect::<Vec<_>>());
-    let picture = raycast::BINDINGS.iter().find(|b| b.name == "picture").unwrap();
-    assert_eq!(picture.kind, BindingKind::Storage { read_only: false });
+    let gathered = raycast::BINDINGS.iter().find(|b| b.name == "gathered").unwrap();
+    assert_eq!(gathered.kind, BindingKind::Storage { read_only: false });
 }
 
 #[test]

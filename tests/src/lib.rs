@@ -13,7 +13,8 @@ use volery::{
     read_input,
 };
 use volery_frame::{
-    Brick, BrickId, Content, Device, DrawError, Drawn, Frame, Planes, Revision, UploadError, VolumeLayout,
+    Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, PictureView, Planes, Revision,
+    UploadError, UploadedBytes, VolumeLayout,
 };
 use volery_io::SceneFile;
 use volery_io::scene_file::SceneTransfer;
@@ -194,15 +195,34 @@ impl<B: Backend> Backend for Unblended<B> {
         self.0.upload(bricks)
     }
 
+    fn evict(&mut self, bricks: &[BrickId]) {
+        self.0.evict(bricks);
+    }
+
     fn resident_bytes(&self) -> u64 {
         self.0.resident_bytes()
     }
 
-    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
-        let Content::Planes(planes) = frame.content else { return self.0.draw(frame) };
+    fn uploaded_bytes(&self) -> UploadedBytes {
+        self.0.uploaded_bytes()
+    }
+
+    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
+        self.0.begin(view)
+    }
+
+    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
+        let Content::Planes(planes) = *content else { return self.0.draw_part(content) };
         let mut bricks = planes.bricks.to_vec();
         bricks.iter_mut().for_each(|brick| brick.low_corners = 0);
-        let content = Content::Planes(Planes { bricks: &bricks, ..planes });
-        self.0.draw(&Frame { content, ..frame.clone() })
+        self.0.draw_part(&Content::Planes(Planes { bricks: &bricks, ..planes }))
+    }
+
+    fn finished(&mut self) -> Vec<FinishedPart> {
+        self.0.finished()
+    }
+
+    fn finish(&mut self) -> Result<Drawn, DrawError> {
+        self.0.finish()
     }
 }

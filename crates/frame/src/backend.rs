@@ -1,6 +1,6 @@
 //! The trait of executors.
 
-use crate::{Brick, BrickId, Content, Frame, Revision, TexelType, VolumeLayout, planes, sheets};
+use crate::{Brick, BrickId, Content, Frame, PictureView, Revision, TexelType, VolumeLayout, planes, sheets};
 
 /// A picture in linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,14 +33,41 @@ pub struct Device {
     pub name: String,
 }
 
-/// What a draw returns.
+/// A part of a picture that the device has drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FinishedPart {
+    /// The part, as [`Backend::draw_part`] numbered it.
+    pub number: u32,
+    /// Seconds that it took, where the device has a clock.
+    pub device_seconds: Option<f64>,
+}
+
+/// Bytes that a backend has handed to its device since it was made, by what they are. None where there is no device
+/// but this one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct UploadedBytes {
+    /// Texels.
+    pub bricks: u64,
+    /// Where bricks are.
+    pub places: u64,
+    /// Which of them are of a part.
+    pub choices: u64,
+    /// Tables of transfer functions.
+    pub transfers: u64,
+    /// Cubes, sheets and surfaces.
+    pub geometry: u64,
+    /// How a part or a tile is seen: what depends on the camera and costs some bytes each time.
+    pub views: u64,
+}
+
+/// A picture that is read back.
 #[derive(Clone, Debug)]
 pub struct Drawn {
     /// The picture.
     pub image: Image,
-    /// Seconds that the device itself measured for the draw, where it can.
+    /// Seconds that the device itself measured for the whole picture, where it can.
     pub device_seconds: Option<f64>,
-    /// Of rays: what their integration may be off by.
+    /// Of rays: what their integration may be off by, in all parts together.
     pub ray_doubt: Option<RayDoubt>,
 }
 
@@ -98,6 +125,9 @@ pub enum UploadError {
 /// Why a frame could not be drawn.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DrawError {
+    /// A part of a picture, or its end, without its beginning.
+    #[error("draw: no picture was begun")]
+    NoPicture,
     /// No volume was set.
     #[error("draw: no volume layout was set")]
     NoVolume,
@@ -186,37 +216,80 @@ pub trait Backend: Send {
     /// When a brick does not fit the layout or the device. No brick of this call is resident then.
     fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError>;
 
+    /// Forgets bricks; those that are not resident are passed over. What they took of the device's memory is used by
+    /// later uploads.
+    fn evict(&mut self, bricks: &[BrickId]);
+
     /// Bytes of device memory that the bricks take, with all that the backend keeps per brick.
     fn resident_bytes(&self) -> u64;
 
-    /// Draws a frame and reads the picture back.
+    /// What was handed to the device so far.
+    fn uploaded_bytes(&self) -> UploadedBytes;
+
+    /// Begins a picture. One that is under way is dropped.
     ///
     /// # Errors
-    /// When a brick is missing or misplaced, or the device fails.
-    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError>;
+    /// When the picture's size is none or the device fails. Then no picture is under way.
+    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError>;
+
+    /// Adds what comes next to the picture, behind all that it shows, and returns the number of the part: parts count
+    /// from 0. Need not wait until the device has drawn it.
+    ///
+    /// # Errors
+    /// When no picture was begun, a brick is missing or misplaced, or the device fails. The picture is then as it was,
+    /// unless the device failed, which ends it.
+    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError>;
+
+    /// The parts of the last picture that was begun of which is known, without waiting, that they are drawn. Each is
+    /// told once, in any order; after [`Backend::finish`] all are.
+    fn finished(&mut self) -> Vec<FinishedPart>;
+
+    /// Ends the picture: puts surfaces and background behind it and reads it back.
+    ///
+    /// # Errors
+    /// When no picture was begun or the device fails. No picture is under way afterwards.
+    fn finish(&mut self) -> Result<Drawn, DrawError>;
+
+    /// Draws a picture of one part and reads it back.
+    ///
+    /// # Errors
+    /// As [`Backend::begin`], [`Backend::draw_part`] and [`Backend::finish`].
+    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
+        self.begin(&frame.view)?;
+        self.draw_part(&frame.content)?;
+        self.finish()
+    }
 }
 
-/// Checks that every backend makes before it draws: size, placement of bricks, planes, sheets, and whether there is a
-/// volume with the texels that the content needs.
+/// Checks that every backend makes before it begins a picture.
 ///
 /// # Errors
-/// [`DrawError::Size`], [`DrawError::NoVolume`], [`DrawError::Misplaced`], [`DrawError::RaysThroughColors`],
-/// [`DrawError::TooManyPlanes`], [`DrawError::Plane`] or [`DrawError::Sheets`].
-pub fn check_frame(frame: &Frame<'_>, layout: Option<&VolumeLayout>, max_size: u32) -> Result<(), DrawError> {
-    let (width, height) = (frame.width, frame.height);
+/// [`DrawError::Size`].
+pub fn check_view(view: &PictureView<'_>, max_size: u32) -> Result<(), DrawError> {
+    let (width, height) = (view.width, view.height);
     if !(1..=max_size).contains(&width) || !(1..=max_size).contains(&height) {
         return Err(DrawError::Size { width, height, max: max_size });
     }
-    if let Content::Sheets(content) = &frame.content {
+    Ok(())
+}
+
+/// Checks that every backend makes before it draws a part: placement of bricks, planes, sheets, and whether there is a
+/// volume with the texels that the content needs.
+///
+/// # Errors
+/// [`DrawError::NoVolume`], [`DrawError::Misplaced`], [`DrawError::RaysThroughColors`], [`DrawError::TooManyPlanes`],
+/// [`DrawError::Plane`] or [`DrawError::Sheets`].
+pub fn check_content(content: &Content<'_>, layout: Option<&VolumeLayout>) -> Result<(), DrawError> {
+    if let Content::Sheets(content) = content {
         return sheets::check(content);
     }
     let layout = layout.ok_or(DrawError::NoVolume)?;
-    match &frame.content {
+    match content {
         Content::Rays(_) if layout.texel == TexelType::Rgba8 => return Err(DrawError::RaysThroughColors),
         Content::Rays(_) | Content::Cubes(_) | Content::Sheets(_) => {}
         Content::Planes(content) => planes::check(content.planes)?,
     }
-    for brick in frame.content.bricks() {
+    for brick in content.bricks() {
         let size = layout
             .brick_cells
             .checked_shl(brick.level)

@@ -108,7 +108,7 @@ pub struct Brick<'a> {
 }
 
 /// Where a resident brick stands in the picture's volume.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PlacedBrick {
     /// Which brick.
     pub id: BrickId,

@@ -22,7 +22,7 @@ pub struct BrickGrid {
 }
 
 impl BrickGrid {
-    /// The grid over a layout's volume of bricks that [`check_frame`](crate::backend::check_frame) let pass.
+    /// The grid over a layout's volume of bricks that [`check_content`](crate::backend::check_content) let pass.
     pub fn new(layout: &VolumeLayout, bricks: &[BlendedBrick]) -> Self {
         let brick_cells = layout.brick_cells;
         let mut bricks = bricks.to_vec();

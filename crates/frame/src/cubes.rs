@@ -10,11 +10,14 @@
 //! to the domain `[0, cells]`. Twice that are whole numbers, the *lattice*, so that neighbours share the very same
 //! planes: [`Cube::lattice_bounds`].
 
-use crate::VolumeLayout;
+use crate::{Revision, VolumeLayout};
 
 /// Cubes to see, and how. No brick is read.
 #[derive(Clone, Copy, Debug)]
 pub struct Cubes<'a> {
+    /// Names the list of cubes: an executor may keep what it made of it for parts that give the same revision, which
+    /// promise the same contents in the same order. `None` is never kept.
+    pub revision: Option<Revision>,
     /// Back to front: no cube is hidden by one that comes before it. Cubes do not overlap.
     pub cubes: &'a [Cube],
     /// How the length of the ray in a cube is found.

@@ -14,8 +14,16 @@
 //! by the antiderivative of extinction and of colour times extinction, which sees every control point between the ends
 //! of a piece, however steep the field; where that might be wrong, from control point to control point.
 //!
+//! # Pictures in parts
+//! A picture is made of parts, which come front to back in visibility order: nothing of a part hides anything of one
+//! before it. Between parts a backend keeps of each pixel the colour it has gathered and what light is left, in `f32`, so
+//! each part goes on where the one before ended; surfaces and background come at the end. Within a part the order is
+//! the content's own. So a picture may show what would not fit a device at one time, be looked at between parts, and be
+//! left when there is no more time.
+//!
 //! # Guarantees
-//! A picture depends on the frame alone: not on the number of threads, nor on the order of uploads.
+//! A picture depends on the frame alone: not on the number of threads, nor on the order of uploads, nor on what a
+//! backend kept of others.
 //!
 //! # Non-goals
 //! No choice of bricks (`volery-octree`), no clock, no file, no GPU type.
@@ -29,24 +37,34 @@ pub mod cubes;
 pub mod plane_tiles;
 pub mod planes;
 pub mod ray_transfer;
-mod revision;
 pub mod sheets;
 
-pub use backend::{Backend, Device, DeviceKind, DrawError, Drawn, Image, RayDoubt, UploadError};
+pub use backend::{
+    Backend, Device, DeviceKind, DrawError, Drawn, FinishedPart, Image, RayDoubt, UploadError, UploadedBytes,
+};
 pub use brick::{Brick, BrickId, PlacedBrick, TexelType, Texels, VolumeLayout};
 pub use brick_grid::BrickGrid;
 pub use cubes::{Cube, Cubes, Thickness};
 pub use plane_tiles::{PlaneTile, PlaneTiles};
 pub use planes::{BlendedBrick, Planes, PointTransfer, Sampling};
 pub use ray_transfer::RayTransfer;
-pub use revision::Revision;
-pub use sheets::{Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets};
+pub use sheets::{Counted, Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets};
 
+pub use volery_scene::Revision;
 use volery_scene::{Camera, TriangleMesh};
 
-/// One picture to draw of the volume that a backend holds.
+/// A picture of one part.
 #[derive(Clone, Debug)]
 pub struct Frame<'a> {
+    /// How the picture is taken.
+    pub view: PictureView<'a>,
+    /// What is to be seen.
+    pub content: Content<'a>,
+}
+
+/// How a picture is taken: all but what is to be seen.
+#[derive(Clone, Copy, Debug)]
+pub struct PictureView<'a> {
     /// Pixels from left to right, at least 1.
     pub width: u32,
     /// Pixels from top to bottom, at least 1.
@@ -56,12 +74,10 @@ pub struct Frame<'a> {
     /// Linear RGB behind everything.
     pub background: [f32; 3],
     /// Opaque surfaces among the content. The ray of a pixel's centre ends at the nearest, of equals at the first in
-    /// the list; the mesh's colour times [`shade`](volery_scene::mesh::shade) is then what is behind everything. Matter
+    /// the list; the mesh's colour times [`shade`](volery_scene::mesh::shade) then is what is behind everything. Matter
     /// and cubes count up to there, planes before it; of a sheet, that part of its slab, half before and half behind the
     /// triangle along the ray, which is before it. Triangles whose thickness has a slope count whole if they are.
     pub meshes: &'a [TriangleMesh],
-    /// What is to be seen.
-    pub content: Content<'a>,
 }
 
 /// What is to be seen of a volume.

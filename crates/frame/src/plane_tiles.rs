@@ -25,7 +25,7 @@
 use glam::DVec3;
 use volery_scene::{Plane, Projection, RayGrid};
 
-use crate::{Frame, VolumeLayout};
+use crate::{PictureView, VolumeLayout};
 
 /// Pixels of a tile per axis.
 pub const TILE: u32 = 16;
@@ -82,8 +82,8 @@ struct Anchor {
 }
 
 impl PlaneTiles {
-    /// The planes as the camera of `frame` sees them; none is degenerate.
-    pub fn new(frame: &Frame<'_>, planes: &[Plane], layout: &VolumeLayout) -> Self {
+    /// The planes as a picture's camera sees them; none is degenerate.
+    pub fn new(picture: &PictureView<'_>, planes: &[Plane], layout: &VolumeLayout) -> Self {
         let cells = DVec3::from_array(layout.cells.map(f64::from));
         let view = |plane: &Plane| {
             let is_along = |&axis: &usize| (0..3).all(|other| other == axis || plane.normal[other] == 0.0);
@@ -96,8 +96,8 @@ impl PlaneTiles {
         };
         Self {
             planes: planes.iter().map(view).collect(),
-            rays: frame.camera.rays(frame.width, frame.height),
-            is_perspective: matches!(frame.camera.projection, Projection::Perspective { .. }),
+            rays: picture.camera.rays(picture.width, picture.height),
+            is_perspective: matches!(picture.camera.projection, Projection::Perspective { .. }),
             spacing: layout.spacing,
             cells,
         }
@@ -206,8 +206,8 @@ fn narrow(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Content, RayTransfer, Rays, Revision, TexelType};
-    use volery_scene::{Camera, ControlPoint, TransferFunction};
+    use crate::{Revision, TexelType};
+    use volery_scene::Camera;
 
     /// What f32 makes of a tile at one of its pixels: the place from the volume's corner, and the depth.
     fn evaluated(tile: &PlaneTile, pixel: [f32; 2]) -> Option<[f64; 4]> {
@@ -255,9 +255,6 @@ mod tests {
     #[test]
     fn places_in_f32_are_those_of_f64() {
         let (mut worst, mut worst_cells, mut num) = (0.0_f64, 0.0_f64, 0);
-        let point = ControlPoint { value: 0.0, color: [0.0; 3], opacity: 0.0 };
-        let transfer = TransferFunction::new(vec![point], 1.0).unwrap();
-        let transfer = RayTransfer::new(&transfer, &layout(511, DVec3::ONE));
         for spacing in [DVec3::ONE, DVec3::new(1.0, 1.0, 10.0), DVec3::splat(1e-9)] {
             let layout = layout(511, spacing);
             let extent = spacing * 511.0;
@@ -265,10 +262,9 @@ mod tests {
                 let planes: Vec<_> = [[0.3, 0.5, 0.81], [1.0, 0.0, 0.0], [0.0, 2.0, 1e-7], [-1.0, 0.7, 0.02]]
                     .map(|n| Plane::through(extent * 0.47, DVec3::from_array(n) / spacing))
                     .into();
-                let content = Content::Rays(Rays { transfer: &transfer, bricks: &[] });
-                let frame =
-                    Frame { width: 512, height: 384, camera, background: [0.0; 3], meshes: &[], content };
-                let tiles = PlaneTiles::new(&frame, &planes, &layout);
+                let picture =
+                    PictureView { width: 512, height: 384, camera, background: [0.0; 3], meshes: &[] };
+                let tiles = PlaneTiles::new(&picture, &planes, &layout);
                 let rays = camera.rays(512, 384);
                 for (column, row) in
                     (0..512).step_by(112).flat_map(|c| (0..384).step_by(96).map(move |r| (c, r)))
@@ -318,15 +314,11 @@ mod tests {
                 let layout = layout(cells, DVec3::splat(spacing));
                 let extent = f64::from(cells) * spacing;
                 let view = Camera::fitted(DVec3::splat(extent.max(1.0)), 30.0, 20.0, 1.0, true);
-                let point = ControlPoint { value: 0.0, color: [0.0; 3], opacity: 0.0 };
-                let transfer = TransferFunction::new(vec![point], 1.0).unwrap();
-                let transfer = RayTransfer::new(&transfer, &layout);
-                let content = Content::Rays(Rays { transfer: &transfer, bricks: &[] });
-                let frame =
-                    Frame { width: 16, height: 16, camera: view, background: [0.0; 3], meshes: &[], content };
+                let picture =
+                    PictureView { width: 16, height: 16, camera: view, background: [0.0; 3], meshes: &[] };
                 for (distance, place) in [(0.0, 0.0), (extent, f64::from(cells))] {
                     let planes = [Plane { normal: DVec3::Y, distance }];
-                    let tiles = PlaneTiles::new(&frame, &planes, &layout);
+                    let tiles = PlaneTiles::new(&picture, &planes, &layout);
                     assert_eq!(tiles.planes[0].fixed, Some((1, place)), "{cells} cells of {spacing}");
                 }
             }

@@ -34,7 +34,7 @@
 //! Sample `i` of low is sample `min(2 i, n - 1)` of the `n` that a brick holds along an axis, at the place of
 //! `2 i`: a volume that ends within a coarse cell repeats its last sample, as coarser levels do.
 
-use volery_scene::{Plane, TransferFunction};
+use volery_scene::{Plane, Revision, TransferFunction};
 
 use crate::{DrawError, PlacedBrick, VolumeLayout};
 
@@ -84,7 +84,7 @@ pub(crate) fn check(planes: &[Plane]) -> Result<(), DrawError> {
 }
 
 /// A brick and how it blends into its coarser neighbours.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BlendedBrick {
     /// Which brick, and where.
     pub placed: PlacedBrick,
@@ -121,8 +121,9 @@ pub fn outline_color(level: u32) -> [f32; 3] {
 /// The transfer function at a point: straight colour and opacity, piecewise linear in the texel.
 ///
 /// Control points as they are, in f32, not a table: exact between them, and a step stays one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct PointTransfer {
+    revision: Revision,
     points: Vec<[f32; 5]>,
 }
 
@@ -141,7 +142,12 @@ impl PointTransfer {
         if layout.value_scale < 0.0 {
             points.reverse();
         }
-        Self { points }
+        Self { revision: Revision::new(), points }
+    }
+
+    /// Names the points, which never change; that of clones is the same.
+    pub fn revision(&self) -> Revision {
+        self.revision
     }
 
     /// `[texel, r, g, b, opacity]`, texels not falling; at least one. At a texel where two stand the last counts.

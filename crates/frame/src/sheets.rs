@@ -18,13 +18,18 @@
 //! a pixel's sum is taken to the nearest colour in that range, channel by channel: [`Sheets::emitted`] with what is
 //! behind. The truth lies in the range, so this takes no channel of any pixel farther from it.
 //!
+//! Which sign a triangle of the outline has is a matter of the ray: its thickness rises along a ray that leaves the
+//! domain there, and falls along one that comes in. So the triangles of a gap are listed as two sheets, with thicknesses
+//! of opposite signs, each of which [counts](Counted) the triangles that are its own for the ray at hand: what is sent to
+//! a device serves every eye.
+//!
 //! # Rules of coverage
 //! A pixel is its centre. Triangles that share two vertices by number share that side: a ray through it meets one of
 //! the two. What lies before the eye counts, in orthographic views what lies from the plane through the eye on. Either
 //! side of a triangle is seen.
 
 use glam::DVec3;
-use volery_scene::{Camera, TransferFunction};
+use volery_scene::{Camera, Revision, TransferFunction};
 
 use crate::DrawError;
 
@@ -33,9 +38,9 @@ mod transfer2d;
 /// Sheets to see, and how. No brick is read, no volume needed.
 #[derive(Clone, Copy, Debug)]
 pub struct Sheets<'a> {
-    /// Names vertices and triangles: an executor may keep what it made of them for frames that give the same number,
-    /// which promise the same contents. 0 is never kept. See [`Sheets::next_revision`].
-    pub revision: u64,
+    /// Names vertices and triangles: an executor may keep what it made of them for parts that give the same revision,
+    /// which promise the same contents. `None` is never kept.
+    pub revision: Option<Revision>,
     /// The unit normal of all sheets, in world space.
     pub normal: DVec3,
     /// World position that vertices are relative to.
@@ -50,14 +55,6 @@ pub struct Sheets<'a> {
     pub transfer: &'a SheetTransfer,
     /// Shades by the gradient, where vertices have one; `None` shows colours as they are.
     pub light: Option<Light>,
-}
-
-impl Sheets<'_> {
-    /// A revision that no other call in this process has returned; never 0.
-    pub fn next_revision() -> u64 {
-        static NEXT: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(1);
-        NEXT.fetch_add(1, std::sync::atomic::Ordering::Relaxed)
-    }
 }
 
 impl Sheets<'_> {
@@ -162,6 +159,33 @@ pub struct Sheet {
     pub count: u32,
     /// `t = thickness[0] + thickness[1] * (normal . x)` with x relative to the origin, in world lengths.
     pub thickness: [f32; 2],
+    /// Which of the triangles count.
+    pub counted: Counted,
+}
+
+/// Which triangles of a sheet count where a ray meets them. Those of an outline have corners that go around
+/// counter-clockwise as seen from outside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Counted {
+    /// All.
+    #[default]
+    All,
+    /// Where the ray leaves what the outline is of and goes along the normal, or comes in and goes against it.
+    Rising,
+    /// Elsewhere.
+    Falling,
+}
+
+impl Counted {
+    /// Whether a triangle counts for a ray.
+    #[inline]
+    pub fn counts(self, is_leaving: bool, is_along_normal: bool) -> bool {
+        match self {
+            Self::All => true,
+            Self::Rising => is_leaving == is_along_normal,
+            Self::Falling => is_leaving != is_along_normal,
+        }
+    }
 }
 
 impl Sheet {
@@ -198,8 +222,9 @@ impl Light {
 }
 
 /// Colour and extinction over values, or over values and magnitudes of gradients: a table of one row or of many.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct SheetTransfer {
+    revision: Revision,
     entries: Vec<[f32; 4]>,
     columns: usize,
     column_from_value: [f32; 2],
@@ -242,7 +267,13 @@ impl SheetTransfer {
             [scale as f32, (-low * scale) as f32]
         };
         let [column_from_value, row_from_magnitude] = [place(columns, values), place(rows, magnitudes)];
-        Self { entries, columns, column_from_value, row_from_magnitude }
+        let revision = Revision::new();
+        Self { revision, entries, columns, column_from_value, row_from_magnitude }
+    }
+
+    /// Names the table, which never changes; that of clones is the same.
+    pub fn revision(&self) -> Revision {
+        self.revision
     }
 
     /// `[r, g, b, extinction per world length]`, row after row.

@@ -2,12 +2,23 @@
 
 use glam::DVec3;
 
+use crate::Revision;
+
 /// Triangles of one colour. Either side is seen.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct TriangleMesh {
+    revision: Revision,
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     color: [f64; 3],
+}
+
+/// Whether the contents are the same.
+impl PartialEq for TriangleMesh {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { revision: _, points, triangles, color } = self;
+        *points == other.points && *triangles == other.triangles && *color == other.color
+    }
 }
 
 /// Why a mesh could not be made.
@@ -57,7 +68,12 @@ impl TriangleMesh {
         if !color.iter().all(|c| (0.0..=1.0).contains(c)) {
             return Err(Error::Color { found: color });
         }
-        Ok(Self { points, triangles, color })
+        Ok(Self { revision: Revision::new(), points, triangles, color })
+    }
+
+    /// Names the contents, which never change; those of clones are the same.
+    pub fn revision(&self) -> Revision {
+        self.revision
     }
 
     /// World positions.

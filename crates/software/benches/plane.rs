@@ -3,8 +3,8 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use volery_frame::{
-    Backend, BlendedBrick, Brick, BrickId, Content, Frame, PlacedBrick, Planes, PointTransfer, Revision,
-    Sampling, TexelType, Texels, VolumeLayout,
+    Backend, BlendedBrick, Brick, BrickId, Content, Frame, PictureView, PlacedBrick, Planes, PointTransfer,
+    Revision, Sampling, TexelType, Texels, VolumeLayout,
 };
 use volery_scene::{Camera, ControlPoint, Plane, Projection, TransferFunction};
 use volery_software::SoftwareBackend;
@@ -81,8 +81,10 @@ fn plane(criterion: &mut Criterion) {
                 is_transparent: false,
                 shows_bricks: false,
             });
-            let frame =
-                Frame { width: size, height: size, camera, background: [0.0; 3], meshes: &[], content };
+            let frame = Frame {
+                view: PictureView { width: size, height: size, camera, background: [0.0; 3], meshes: &[] },
+                content,
+            };
             group.throughput(Throughput::Elements(u64::from(size) * u64::from(size)));
             group.bench_function(BenchmarkId::new(name, size), |bencher| {
                 bencher.iter(|| backend.draw(&frame).expect("every brick is resident"));

@@ -2,7 +2,9 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use volery_frame::{Backend, Content, Frame, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{
+    Backend, Content, Counted, Frame, PictureView, Revision, Sheet, SheetTransfer, SheetVertices, Sheets,
+};
 use volery_scene::{Camera, CellType, Cells, ControlPoint, Projection, TransferFunction, UnstructuredGrid};
 use volery_slicing::{Planes, Rays, SliceMesh, Slicer};
 use volery_software::SoftwareBackend;
@@ -65,10 +67,11 @@ fn sheets(criterion: &mut Criterion) {
                 first: sheet.triangles.start,
                 count: sheet.triangles.end - sheet.triangles.start,
                 thickness: sheet.thickness.map(|t| t as f32),
+                counted: Counted::All,
             })
             .collect();
         let content = Content::Sheets(Sheets {
-            revision: Sheets::next_revision(),
+            revision: Some(Revision::new()),
             normal: mesh.normal,
             origin: mesh.origin,
             vertices: SheetVertices::Exact { points: &mesh.points, gradients: &[] },
@@ -77,7 +80,10 @@ fn sheets(criterion: &mut Criterion) {
             transfer: &transfer,
             light: None,
         });
-        let frame = Frame { width: 512, height: 512, camera, background: [0.0; 3], meshes: &[], content };
+        let frame = Frame {
+            view: PictureView { width: 512, height: 512, camera, background: [0.0; 3], meshes: &[] },
+            content,
+        };
         let mut backend = SoftwareBackend::new();
         group.throughput(Throughput::Elements(mesh.triangles.len() as u64));
         group.bench_function(BenchmarkId::new("draw", count), |bencher| {

@@ -1,7 +1,9 @@
 //! A brick as the executor keeps it: samples, and the range of every block of cells.
 
+use std::sync::Mutex;
+
 use volery_frame::ray_transfer::BinSet;
-use volery_frame::{Brick, RayTransfer, UploadError, VolumeLayout};
+use volery_frame::{Brick, RayTransfer, Revision, UploadError, VolumeLayout};
 
 use crate::texel::Texel;
 
@@ -27,6 +29,17 @@ pub(crate) struct StoredBrick<T> {
     blocks: [u32; 3],
     /// Smallest and largest texel that is not blank, per block, x fastest; reversed when all are blank.
     ranges: Box<[[T; 2]]>,
+    /// What was asked last.
+    marked: Mutex<Option<(Marks, Revision, u32)>>,
+}
+
+/// The blocks of a brick that a ray needs to know.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Marks {
+    /// Those that may hold matter.
+    pub(crate) occupancy: Occupancy,
+    /// Those that are too much for the table, if there are any.
+    pub(crate) exact: Option<Occupancy>,
 }
 
 /// Whether a brick fits a layout.
@@ -59,16 +72,34 @@ impl<T: Texel> StoredBrick<T> {
                 }
             }
         }
-        Self { samples, texels: texels.into(), blocks, ranges: ranges.into() }
+        Self { samples, texels: texels.into(), blocks, ranges: ranges.into(), marked: Mutex::default() }
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        let Self { samples: _, texels, blocks: _, ranges } = self;
+        let Self { samples: _, texels, blocks: _, ranges, marked: _ } = self;
         (size_of::<Self>() + size_of_val::<[T]>(texels) + size_of_val::<[[T; 2]]>(ranges)) as u64
     }
 
+    /// The blocks of a brick that lies at a level, of whose cells these bins are too much for the table; `None` when none
+    /// holds matter. Kept until another transfer function or level asks.
+    pub(crate) fn marks(&self, transfer: &RayTransfer, exact: &BinSet, level: u32) -> Option<Marks> {
+        let find = || {
+            let occupancy = self.blocks(transfer, transfer.visible_bins()).unwrap_or([0; 64]);
+            Marks { occupancy, exact: self.blocks(transfer, exact) }
+        };
+        let marks = match self.marked.lock() {
+            // Nobody panics with the lock.
+            Err(_) => find(),
+            Ok(mut marked) => match *marked {
+                Some((marks, revision, at)) if (revision, at) == (transfer.revision(), level) => marks,
+                _ => marked.insert((find(), transfer.revision(), level)).0,
+            },
+        };
+        (marks.occupancy != [0; 64]).then_some(marks)
+    }
+
     /// Marks the blocks whose texels meet a set of bins; `None` when there is none.
-    pub(crate) fn blocks(&self, transfer: &RayTransfer, bins: &BinSet) -> Option<Occupancy> {
+    fn blocks(&self, transfer: &RayTransfer, bins: &BinSet) -> Option<Occupancy> {
         if bins.is_empty() {
             return None;
         }
@@ -90,7 +121,7 @@ impl StoredBrick<u8> {
     /// Of colours, through which no ray is cast: without ranges.
     pub(crate) fn of_colors(samples: [u32; 3], texels: &[[u8; 4]]) -> Self {
         let texels = (0..4).flat_map(|channel| texels.iter().map(move |texel| texel[channel])).collect();
-        Self { samples, texels, blocks: [0; 3], ranges: Box::new([]) }
+        Self { samples, texels, blocks: [0; 3], ranges: Box::new([]), marked: Mutex::default() }
     }
 }
 

@@ -28,48 +28,25 @@ mod fan_raster;
 mod view;
 
 use fearless_simd::{Level, dispatch, f32x16, prelude::*};
-use rayon::prelude::*;
-use volery_frame::{Cube, Cubes, Frame, Thickness, VolumeLayout};
+use volery_frame::{Cube, Cubes, Thickness, VolumeLayout};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::math::{axes, opacity_of_depth};
 use crate::surfaces::Surfaces;
-use crate::tile::{TILE, assembled, tile_behind};
+use crate::target::{Light, NUM_PACKETS, PACKET, TILE_PACKETS, Target, Tile};
 use bins::Bins;
 use fan_raster::Raster;
 use view::{PacketRays, View};
 
-/// Pixels of a packet per axis; a lane is `column + 4 * row`.
-const PACKET: u32 = 4;
-
-/// Packets of a tile per axis: a tile's packets are the bits of a `u64`.
-const TILE_PACKETS: u32 = 8;
-
-const _: () = assert!(TILE == PACKET * TILE_PACKETS, "packets fill a tile");
-
-const NUM_PACKETS: usize = (TILE_PACKETS * TILE_PACKETS) as usize;
-
-/// Red, green, blue and transmittance of a packet's rays.
-type Light = [[f32; 16]; 4];
-
-/// Draws a checked frame.
-pub(crate) fn draw(
-    level: Level,
-    (frame, surfaces): (&Frame<'_>, &Surfaces),
-    content: &Cubes<'_>,
-    layout: &VolumeLayout,
-) -> Vec<[f32; 3]> {
-    let view = View::new(frame, layout);
+/// Draws a checked part.
+pub(crate) fn draw(level: Level, target: &mut Target, content: &Cubes<'_>, layout: &VolumeLayout) {
+    let view = View::new(&target.view, layout);
     let bins = Bins::new(level, content.cubes, layout, &view);
-    let shared = Shared { surfaces, content, layout, view, bins };
-    let columns = frame.width.div_ceil(TILE);
-    let tiles: Vec<Vec<[f32; 3]>> = (0..columns * frame.height.div_ceil(TILE))
-        .into_par_iter()
-        .map(
-            |tile| dispatch!(level, simd => draw_tile(simd, &shared, tile, [tile % columns, tile / columns])),
-        )
-        .collect();
-    assembled(frame, &tiles)
+    let (view, bins) = (&view, &bins);
+    target.draw_tiles(|surfaces, number, first, tile| {
+        let shared = Shared { surfaces, content, layout, view, bins };
+        dispatch!(level, simd => draw_tile(simd, &shared, number, first, tile));
+    });
 }
 
 /// All that tiles share.
@@ -77,31 +54,31 @@ struct Shared<'a> {
     surfaces: &'a Surfaces,
     content: &'a Cubes<'a>,
     layout: &'a VolumeLayout,
-    view: View,
-    bins: Bins,
+    view: &'a View,
+    bins: &'a Bins,
 }
 
 /// Draws one tile, whole even where it reaches over the edge of the picture.
 #[inline(always)]
-fn draw_tile<S: Simd>(simd: S, shared: &Shared<'_>, tile: u32, place: [u32; 2]) -> Vec<[f32; 3]> {
-    let first = place.map(|place| place * TILE);
-    let behind = tile_behind(shared.surfaces, first[0], first[1]);
-    if shared.bins.is_empty(tile) {
-        return behind;
+fn draw_tile<S: Simd>(simd: S, shared: &Shared<'_>, number: u32, first: [u32; 2], tile: &mut Tile) {
+    if shared.bins.is_empty(number) {
+        return;
     }
     let mut rays = Vec::with_capacity(NUM_PACKETS);
     for packet in 0..NUM_PACKETS as u32 {
         let [x, y] = [packet % TILE_PACKETS, packet / TILE_PACKETS];
         rays.push(shared.view.packet(first[0] + x * PACKET, first[1] + y * PACKET, shared.surfaces));
     }
-    let mut light: Vec<Light> = vec![[[0.0; 16], [0.0; 16], [0.0; 16], [1.0; 16]]; NUM_PACKETS];
+    let light = tile.light();
     let mut raster = match shared.content.thickness {
         Thickness::Exact => None,
-        Thickness::Interpolated => Some(Raster::new(&shared.view, place)),
+        Thickness::Interpolated => Some(Raster::new(shared.view, first)),
     };
     // A packet is open while one of its rays wants more.
-    let mut open = u64::MAX;
-    for (cubes, entries) in shared.bins.front_to_back(shared.content.cubes, tile) {
+    let is_open =
+        |packet: usize| light[packet][3].iter().any(|&transmittance| transmittance > MIN_TRANSMITTANCE);
+    let mut open = (0..NUM_PACKETS).fold(0_u64, |open, packet| open | u64::from(is_open(packet)) << packet);
+    for (cubes, entries) in shared.bins.front_to_back(shared.content.cubes, number) {
         for entry in entries.iter().rev() {
             let cube = &cubes[entry.cube as usize];
             let bounds = cube.lattice_bounds(shared.layout);
@@ -124,25 +101,10 @@ fn draw_tile<S: Simd>(simd: S, shared: &Shared<'_>, tile: u32, place: [u32; 2]) 
                 }
             }
             if open == 0 {
-                return over(behind, &light);
+                return;
             }
         }
     }
-    over(behind, &light)
-}
-
-/// The pixels of a tile, row by row, given those behind the cubes.
-fn over(behind: Vec<[f32; 3]>, light: &[Light]) -> Vec<[f32; 3]> {
-    let mut pixels = behind;
-    for (packet, light) in (0..).zip(light) {
-        let start = packet / TILE_PACKETS * PACKET * TILE + packet % TILE_PACKETS * PACKET;
-        for lane in 0..16_u32 {
-            let of = |channel: usize| light[channel][lane as usize];
-            let pixel = &mut pixels[(start + lane / PACKET * TILE + lane % PACKET) as usize];
-            *pixel = [0, 1, 2].map(|channel| of(channel) + of(3) * pixel[channel]);
-        }
-    }
-    pixels
 }
 
 /// A cube as packets meet it.

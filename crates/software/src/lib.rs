@@ -1,8 +1,8 @@
 //! Executes frames on the CPU: all cores, SIMD, no driver.
 //!
 //! # Method
-//! The picture is cut into tiles, which rayon hands to the cores. A tile knows which bricks its rays can
-//! meet, in visibility order. Its rays go in packets of 16, four by four pixels, one ray per SIMD lane;
+//! The picture is cut into tiles, which rayon hands to the cores. A tile keeps from part to part what its pixels have
+//! gathered and what light is left, see `target`. It knows which bricks its rays can meet, in visibility order. Its rays go in packets of 16, four by four pixels, one ray per SIMD lane;
 //! [`fearless_simd`] chooses AVX-512, AVX2, SSE, NEON or WebAssembly when the program runs.
 //!
 //! All rays of a packet meet the same brick together, so the brick's address, level and size are scalars.
@@ -12,8 +12,8 @@
 //! and exit from one fetch of eight corners, and the two halves are integrated through the
 //! [`RayTransfer`](volery_frame::RayTransfer).
 //!
-//! Empty space costs little: a brick keeps the range of each of its blocks, 8x8x8 of them; a frame marks those
-//! that may hold matter under its transfer function, 512 bits in one SIMD register; lanes leap over the others.
+//! Empty space costs little: a brick keeps the range of each of its blocks, 8x8x8 of them; those that may hold matter
+//! are marked once per transfer function, 512 bits in one SIMD register; lanes leap over the others.
 //!
 //! Cutting planes need no walk: `plane` finds the place that each pixel of a packet sees of each plane, nearest
 //! first, and samples together the lanes that one brick holds; `plane_field` is that brick's field. An oblique plane
@@ -38,7 +38,8 @@
 //! [`RayDoubt`].
 //!
 //! # Guarantees
-//! The same bits for any number of threads. No `unsafe`.
+//! The same bits for any number of threads, and for any parts of a picture but those of sheets where a tile ends early
+//! (`sheets`). No `unsafe`.
 
 mod brick;
 mod cubes;
@@ -50,19 +51,22 @@ mod plane_field;
 mod pool;
 mod sheets;
 mod surfaces;
+mod target;
 mod texel;
 mod tile;
 mod walk;
 
+use std::time::Instant;
+
 use fearless_simd::Level;
-use volery_frame::backend::check_frame;
+use volery_frame::backend::{check_content, check_view};
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, Frame, Image, RayDoubt, Revision,
-    UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, Frame, PictureView,
+    Revision, UploadError, UploadedBytes, VolumeLayout,
 };
 
 use crate::pool::{Pool, for_bricks};
-use crate::surfaces::Surfaces;
+use crate::target::Target;
 
 /// A ray ends when its transmittance falls below this.
 pub const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
@@ -78,6 +82,9 @@ pub const MAX_BRICK_CELLS: u32 = 254;
 pub struct SoftwareBackend {
     level: Level,
     volume: Option<(VolumeLayout, Pool)>,
+    sheets: sheets::Kept,
+    picture: Option<Target>,
+    finished: Vec<FinishedPart>,
 }
 
 impl Default for SoftwareBackend {
@@ -89,34 +96,48 @@ impl Default for SoftwareBackend {
 impl SoftwareBackend {
     /// An executor for the best instruction set of this machine.
     pub fn new() -> Self {
-        Self { level: Level::new(), volume: None }
+        Self::of_level(Level::new())
     }
 
-    /// The pixels of a checked frame.
-    fn pixels(&self, frame: &Frame<'_>) -> Result<(Vec<[f32; 3]>, Option<RayDoubt>), DrawError> {
-        let surfaces = Surfaces::new(frame);
-        let scene = (frame, &surfaces);
-        if let Content::Sheets(content) = &frame.content {
-            return Ok((sheets::draw(self.level, scene, content), None));
-        }
-        let (layout, pool) = self.volume.as_ref().ok_or(DrawError::NoVolume)?;
-        let pixels = match &frame.content {
-            Content::Rays(rays) => {
-                let (pixels, doubt) =
-                    for_bricks!(pool, |bricks| tile::draw(self.level, scene, rays, layout, bricks))?;
-                return Ok((pixels, Some(doubt)));
+    fn of_level(level: Level) -> Self {
+        Self { level, volume: None, sheets: sheets::Kept::default(), picture: None, finished: Vec::new() }
+    }
+
+    /// Adds a part to the picture; whether it is the only one makes no difference but to what ends early.
+    fn draw_some(&mut self, content: &Content<'_>, is_whole: bool) -> Result<u32, DrawError> {
+        let start = Instant::now();
+        let target = self.picture.as_mut().ok_or(DrawError::NoPicture)?;
+        let volume = self.volume.as_ref();
+        check_content(content, volume.map(|(layout, _)| layout))?;
+        let level = self.level;
+        match (content, volume) {
+            (Content::Sheets(content), _) => {
+                sheets::draw(level, &mut self.sheets, target, content, is_whole);
+                target.shown.add_sheets(content.emitted());
             }
-            Content::Cubes(content) => cubes::draw(self.level, scene, content, layout),
-            Content::Planes(planes) => match pool {
-                Pool::U8(bricks) => plane::draw::<_, 1>(self.level, scene, planes, layout, bricks)?,
-                Pool::U16(bricks) => plane::draw::<_, 1>(self.level, scene, planes, layout, bricks)?,
-                Pool::F32(bricks) => plane::draw::<_, 1>(self.level, scene, planes, layout, bricks)?,
-                Pool::Colors(bricks) => plane::draw::<_, 4>(self.level, scene, planes, layout, bricks)?,
-            },
-            // Sheets belong to no volume.
-            Content::Sheets(content) => sheets::draw(self.level, scene, content),
-        };
-        Ok((pixels, None))
+            (_, None) => return Err(DrawError::NoVolume),
+            (Content::Rays(rays), Some((layout, pool))) => {
+                for_bricks!(pool, |bricks| tile::draw(level, target, rays, layout, bricks))?;
+                target.shown.add_rays();
+            }
+            (Content::Planes(planes), Some((layout, pool))) => {
+                match pool {
+                    Pool::U8(bricks) => plane::draw::<_, 1>(level, target, planes, layout, bricks)?,
+                    Pool::U16(bricks) => plane::draw::<_, 1>(level, target, planes, layout, bricks)?,
+                    Pool::F32(bricks) => plane::draw::<_, 1>(level, target, planes, layout, bricks)?,
+                    Pool::Colors(bricks) => plane::draw::<_, 4>(level, target, planes, layout, bricks)?,
+                }
+                target.shown.add_planes();
+            }
+            (Content::Cubes(cubes), Some((layout, _))) => {
+                cubes::draw(level, target, cubes, layout);
+                target.shown.add_cubes();
+            }
+        }
+        let number = target.shown.num_parts - 1;
+        let device_seconds = Some(start.elapsed().as_secs_f64());
+        self.finished.push(FinishedPart { number, device_seconds });
+        Ok(number)
     }
 }
 
@@ -156,15 +177,45 @@ impl Backend for SoftwareBackend {
         Ok(())
     }
 
+    fn evict(&mut self, bricks: &[BrickId]) {
+        if let Some((_, pool)) = &mut self.volume {
+            pool.remove(bricks);
+        }
+    }
+
     fn resident_bytes(&self) -> u64 {
         self.volume.as_ref().map_or(0, |(_, pool)| pool.bytes())
     }
 
+    fn uploaded_bytes(&self) -> UploadedBytes {
+        UploadedBytes::default()
+    }
+
+    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
+        self.picture = None;
+        self.finished.clear();
+        check_view(view, MAX_SIZE)?;
+        self.picture = Some(Target::new(view));
+        Ok(())
+    }
+
+    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
+        self.draw_some(content, false)
+    }
+
+    fn finished(&mut self) -> Vec<FinishedPart> {
+        std::mem::take(&mut self.finished)
+    }
+
+    fn finish(&mut self) -> Result<Drawn, DrawError> {
+        let target = self.picture.take().ok_or(DrawError::NoPicture)?;
+        Ok(Drawn { image: target.image(self.level), device_seconds: None, ray_doubt: target.ray_doubt() })
+    }
+
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
-        check_frame(frame, self.volume.as_ref().map(|(layout, _)| layout), MAX_SIZE)?;
-        let (pixels, ray_doubt) = self.pixels(frame)?;
-        let image = Image { width: frame.width, height: frame.height, pixels };
-        Ok(Drawn { image, device_seconds: None, ray_doubt })
+        self.begin(&frame.view)?;
+        self.draw_some(&frame.content, true)?;
+        self.finish()
     }
 }
 
@@ -190,7 +241,7 @@ mod tests {
         for level in lesser_levels() {
             for (name, property) in conformance::ALL {
                 println!("{level:?}: {name}");
-                property(&mut SoftwareBackend { level, volume: None });
+                property(&mut SoftwareBackend::of_level(level));
             }
         }
     }

@@ -6,9 +6,7 @@ use volery_scene::RayGrid;
 
 use crate::math::axes;
 use crate::surfaces::Surfaces;
-
-/// Pixels of a packet per axis; a lane is `column + 4 * row`.
-pub(crate) const PACKET: u32 = 4;
+use crate::target::PACKET;
 
 /// Finest cells per unit length below which a ray stands still along an axis: 1e-18 of a volume of 1e9 cells.
 const STILL: f64 = 1e-30;

@@ -4,91 +4,84 @@
 //! lie in one brick are sampled together. A lane is done when an opaque place hides the rest.
 
 use fearless_simd::{Level, dispatch, f32x16, i32x16, mask32x16, prelude::*};
-use rayon::prelude::*;
-use volery_frame::plane_tiles::TILE;
+use volery_frame::plane_tiles::TILE as PLANE_TILE;
 use volery_frame::planes::{MAX_PLANES, outline_color, outline_coverage};
-use volery_frame::{BrickGrid, DrawError, Frame, PlaneTile, PlaneTiles, Planes, VolumeLayout};
+use volery_frame::{BrickGrid, DrawError, PlaneTile, PlaneTiles, Planes, VolumeLayout};
 
 use crate::brick::StoredBrick;
 use crate::math::axes;
-use crate::packet::PACKET;
 use crate::plane_field::Field;
 use crate::pool::Bricks;
 use crate::surfaces::Surfaces;
+use crate::target::{self, PACKET, TILE, TILE_PACKETS, Target, Tile};
 use crate::texel::Texel;
 
 /// Denominators below this are beyond a plane's horizon.
 const HORIZON: f32 = 1e-12;
 
+const _: () = assert!(TILE.is_multiple_of(PLANE_TILE), "tiles of planes fill a tile");
+
 /// All that tiles share.
 struct Shared<'a, T> {
-    frame: &'a Frame<'a>,
+    /// Pixels of the picture.
+    size: [u32; 2],
     surfaces: &'a Surfaces,
     content: &'a Planes<'a>,
     layout: &'a VolumeLayout,
-    tiles: PlaneTiles,
-    grid: BrickGrid,
+    tiles: &'a PlaneTiles,
+    grid: &'a BrickGrid,
     /// In the order of the grid's bricks.
-    stored: Vec<&'a StoredBrick<T>>,
+    stored: &'a [&'a StoredBrick<T>],
 }
 
-/// Draws a checked frame of texels of `C` channels.
+/// Draws a checked part of texels of `C` channels.
 pub(crate) fn draw<T: Texel, const C: usize>(
     level: Level,
-    (frame, surfaces): (&Frame<'_>, &Surfaces),
+    target: &mut Target,
     content: &Planes<'_>,
     layout: &VolumeLayout,
     bricks: &Bricks<T>,
-) -> Result<Vec<[f32; 3]>, DrawError> {
+) -> Result<(), DrawError> {
     let missing = content.bricks.iter().find(|brick| !bricks.contains_key(&brick.placed.id));
     if let Some(brick) = missing {
         return Err(DrawError::NotResident { id: brick.placed.id });
     }
     let grid = BrickGrid::new(layout, content.bricks);
-    let stored = grid.bricks().iter().filter_map(|brick| bricks.get(&brick.placed.id)).collect();
-    let tiles = PlaneTiles::new(frame, content.planes, layout);
-    let shared = Shared { frame, surfaces, content, layout, tiles, grid, stored };
-    let width = frame.width as usize;
-    // Zeroes need no memory until a band is written, by the thread that draws it.
-    let mut pixels = vec![[0.0; 3]; width * frame.height as usize];
-    let bands = pixels.par_chunks_mut(width * TILE as usize).enumerate();
-    bands.for_each(|(index, band)| {
-        let first_row = index as u32 * TILE;
-        dispatch!(level, simd => draw_band::<_, T, C>(simd, &shared, band, first_row));
+    let stored: Vec<_> = grid.bricks().iter().filter_map(|brick| bricks.get(&brick.placed.id)).collect();
+    let tiles = PlaneTiles::new(&target.view, content.planes, layout);
+    let size = [target.view.width, target.view.height];
+    let (tiles, grid, stored) = (&tiles, &grid, stored.as_slice());
+    target.draw_tiles(|surfaces, _, first, tile| {
+        let shared = Shared { size, surfaces, content, layout, tiles, grid, stored };
+        dispatch!(level, simd => draw_tile::<_, T, C>(simd, &shared, first, tile));
     });
-    Ok(pixels)
+    Ok(())
 }
 
-/// Draws the tiles of a band of rows.
+/// Draws one tile, by tiles as planes see them.
 #[inline(always)]
-fn draw_band<S: Simd, T: Texel, const C: usize>(
+fn draw_tile<S: Simd, T: Texel, const C: usize>(
     simd: S,
     shared: &Shared<'_, T>,
-    band: &mut [[f32; 3]],
-    first_row: u32,
+    [left, top]: [u32; 2],
+    tile: &mut Tile,
 ) {
-    let width = shared.frame.width;
-    let num_rows = (band.len() / width as usize) as u32;
-    for (pixel, color) in (0..).zip(&mut *band) {
-        *color = shared.surfaces.color(pixel % width, first_row + pixel / width);
-    }
     let mut planes: Vec<PlaneTile> = Vec::with_capacity(MAX_PLANES);
-    for first_column in (0..width).step_by(TILE as usize) {
-        planes.clear();
-        planes.extend(shared.tiles.tile(first_column, first_row).flatten());
-        let Some(PlaneTile { zero_depth, .. }) = planes.first().copied() else { continue };
-        let num_columns = (width - first_column).min(TILE);
-        for y in (0..num_rows).step_by(PACKET as usize) {
-            for x in (0..num_columns).step_by(PACKET as usize) {
-                let ends = depths_of_ends(shared, zero_depth, [first_column + x, first_row + y]);
-                let ends = f32x16::from_slice(simd, &ends);
-                let lights = draw_packet::<S, T, C>(simd, shared, &planes, [x, y], ends);
-                for (lane, light) in (0..).zip(&lights) {
-                    let [x, y] = [x + lane % PACKET, y + lane / PACKET];
-                    if x < num_columns && y < num_rows {
-                        let pixel = &mut band[(y * width + first_column + x) as usize];
-                        *pixel = light.over(*pixel);
-                    }
+    let [right, bottom] = [0, 1].map(|axis| ([left, top][axis] + TILE).min(shared.size[axis]));
+    for first_row in (top..bottom).step_by(PLANE_TILE as usize) {
+        for first_column in (left..right).step_by(PLANE_TILE as usize) {
+            planes.clear();
+            planes.extend(shared.tiles.tile(first_column, first_row).flatten());
+            let Some(PlaneTile { zero_depth, .. }) = planes.first().copied() else { continue };
+            let light = tile.light();
+            for row in (first_row..bottom.min(first_row + PLANE_TILE)).step_by(PACKET as usize) {
+                for column in (first_column..right.min(first_column + PLANE_TILE)).step_by(PACKET as usize) {
+                    let ends = depths_of_ends(shared, zero_depth, [column, row]);
+                    let ends = f32x16::from_slice(simd, &ends);
+                    let packet = (row - top) / PACKET * TILE_PACKETS + (column - left) / PACKET;
+                    let gathered = &mut light[packet as usize];
+                    let place = [column - first_column, row - first_row];
+                    draw_packet::<S, T, C>(simd, shared, &planes, place, (ends, gathered));
                 }
             }
         }
@@ -124,14 +117,6 @@ impl Light {
             *sum += share * color;
         }
         self.transmittance *= 1.0 - opacity;
-    }
-
-    #[inline(always)]
-    fn over(&self, background: [f32; 3]) -> [f32; 3] {
-        axes(
-            #[inline(always)]
-            |i| self.transmittance.mul_add(background[i], self.color[i]),
-        )
     }
 }
 
@@ -185,16 +170,20 @@ impl<S: Simd> Hit<S> {
     }
 }
 
-/// The light of the sixteen pixels from `(column, row)` of the tile on, to the depths at which their rays end.
+/// Adds to the light of the sixteen pixels from `(column, row)` of the planes' tile on, to the depths at which their
+/// rays end.
 #[inline(always)]
 fn draw_packet<S: Simd, T: Texel, const C: usize>(
     simd: S,
     shared: &Shared<'_, T>,
     planes: &[PlaneTile],
     [column, row]: [u32; 2],
-    ends: f32x16<S>,
-) -> [Light; 16] {
-    let mut lights = [Light { color: [0.0; 3], transmittance: 1.0 }; 16];
+    (ends, gathered): (f32x16<S>, &mut target::Light),
+) {
+    let mut lights: [Light; 16] = std::array::from_fn(
+        #[inline(always)]
+        |lane| Light { color: axes(|i| gathered[i][lane]), transmittance: gathered[3][lane] },
+    );
     let lane = |of: fn(usize) -> usize| std::array::from_fn(|i| of(i) as f32);
     let x: [f32; 16] = lane(|i| i % PACKET as usize);
     let y: [f32; 16] = lane(|i| i / PACKET as usize);
@@ -202,7 +191,7 @@ fn draw_packet<S: Simd, T: Texel, const C: usize>(
     let y = f32x16::from_slice(simd, &y) + row as f32;
     // Planes that lanes have still to see.
     let mut open = [0_u64; MAX_PLANES];
-    let mut wanted = 0xffff;
+    let mut wanted = still_wanted(&lights);
     for (open, plane) in open.iter_mut().zip(planes) {
         let hit = Hit::new(simd, plane, shared.layout, x, y);
         *open = (hit.lanes & hit.depth.simd_lt(ends)).to_bitmask();
@@ -224,11 +213,19 @@ fn draw_packet<S: Simd, T: Texel, const C: usize>(
                 shade::<S, T, C>(simd, shared, plane, &hit, lanes & wanted, &mut lights);
             }
         }
-        for (lane, light) in lights.iter().enumerate() {
-            wanted &= !(u64::from(light.transmittance <= 0.0) << lane);
-        }
+        wanted = still_wanted(&lights);
     }
-    lights
+    for (lane, light) in lights.iter().enumerate() {
+        (0..3).for_each(|i| gathered[i][lane] = light.color[i]);
+        gathered[3][lane] = light.transmittance;
+    }
+}
+
+/// Lanes that something behind could still show in.
+#[inline(always)]
+fn still_wanted(lights: &[Light; 16]) -> u64 {
+    let is_wanted = |light: &Light| u64::from(light.transmittance <= 0.0) ^ 1;
+    lights.iter().enumerate().fold(0, |wanted, (lane, light)| wanted | is_wanted(light) << lane)
 }
 
 /// Adds what `lanes` see of a plane.

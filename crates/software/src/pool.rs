@@ -51,6 +51,10 @@ impl Pool {
         for_bricks!(self, |bricks| bricks.values().map(StoredBrick::bytes).sum())
     }
 
+    pub(crate) fn remove(&mut self, old: &[BrickId]) {
+        for_bricks!(self, |bricks| old.iter().for_each(|id| drop(bricks.remove(id))));
+    }
+
     /// Adds bricks that were checked against the layout; blocks have `block` cells per axis.
     pub(crate) fn insert(&mut self, new: &[Brick<'_>], block: u32) {
         fn stored<T: Texel>(new: &[Brick<'_>], block: u32) -> Vec<(BrickId, StoredBrick<T>)> {

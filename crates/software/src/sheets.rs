@@ -13,9 +13,12 @@
 //! # Where a tile ends early
 //! Negative thickness can make transmittance rise again. What the triangles of a block of pixels can add at most is
 //! known before the first is drawn; a block ends when, with all of that, less than [`MIN_TRANSMITTANCE`] comes through.
+//! A part of a picture does not know what later ones take away, and leaves room for one strip: so in parts a picture is
+//! the same to the bit where it does not end early, and else to that rest.
 //!
 //! # Cost
-//! Beside the sheets, 40 bytes per vertex and 12 per triangle and tile. Nothing is kept between frames.
+//! Beside the sheets, 40 bytes per vertex and 12 per triangle and tile. What does not depend on the camera, tables and
+//! quantised vertices as numbers, is kept for parts of the same revisions.
 
 mod bins;
 mod ends;
@@ -24,17 +27,15 @@ mod shade;
 mod table;
 mod view;
 
-use std::borrow::Cow;
-
 use fearless_simd::{Level, dispatch, prelude::*};
 use rayon::prelude::*;
 use volery_frame::sheets::MAX_STRIP_DEPTH;
-use volery_frame::{Frame, Quantization, SheetVertices, Sheets};
+use volery_frame::{Quantization, Revision, SheetVertices, Sheets};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::math::axes;
 use crate::surfaces::Surfaces;
-use crate::tile::{TILE, assembled, tile_behind};
+use crate::target::{TILE, Target, Tile};
 use bins::{Bins, Entry};
 use ends::Placed;
 use raster::{Fragments, Packet, Triangle};
@@ -57,95 +58,121 @@ const BATCHES_PER_LOOK: u32 = 4;
 /// Thickness above this is this, so that no product of finite numbers is infinite.
 const MAX_THICKNESS: f32 = 1e30;
 
-/// A checked frame of sheets.
+/// A checked part of sheets.
 struct Scene<'a> {
     content: &'a Sheets<'a>,
-    surfaces: &'a Surfaces,
-    points: Cow<'a, [[f32; 4]]>,
-    gradients: Cow<'a, [[f32; 4]]>,
+    points: &'a [[f32; 4]],
+    gradients: &'a [[f32; 4]],
     vertices: Vec<Vertex>,
     view: View,
-    table: Table,
-    /// See [`Sheets::emitted`].
-    emitted: [[f32; 3]; 2],
+    table: &'a Table,
+    /// Optical depth that later parts may take away.
+    rise_behind: f32,
 }
 
-/// Draws a checked frame.
-pub(crate) fn draw(
-    level: Level,
-    (frame, surfaces): (&Frame<'_>, &Surfaces),
-    content: &Sheets<'_>,
-) -> Vec<[f32; 3]> {
-    let points = points(&content.vertices);
-    let has_rows = content.transfer.rows() > 1;
-    let mut gradients = Cow::Borrowed(&[][..]);
-    if has_rows || content.light.is_some() {
-        gradients = self::gradients(&content.vertices);
+/// What of parts does not depend on the camera.
+#[derive(Debug, Default)]
+pub(crate) struct Kept {
+    table: Option<(Revision, bool, Table)>,
+    vertices: Option<(Option<Revision>, Numbers)>,
+}
+
+/// Quantised vertices as numbers; gradients only where they count.
+#[derive(Debug)]
+struct Numbers {
+    points: Vec<[f32; 4]>,
+    gradients: Option<Vec<[f32; 4]>>,
+}
+
+impl Kept {
+    /// The table of a part, and its points and gradients.
+    fn of<'a>(&'a mut self, content: &Sheets<'a>) -> (&'a Table, &'a [[f32; 4]], &'a [[f32; 4]]) {
+        let has_rows = content.transfer.rows() > 1;
+        let is_needed = has_rows || content.light.is_some();
+        let (points, gradients) = match content.vertices {
+            SheetVertices::Exact { points, gradients } => (points, if is_needed { gradients } else { &[] }),
+            SheetVertices::Quantized { points, gradients, quantization } => {
+                let is_same = |(revision, numbers): &(Option<Revision>, Numbers)| {
+                    let has_all = numbers.gradients.is_some() || !is_needed;
+                    revision.is_some() && *revision == content.revision && has_all
+                };
+                let kept = self.vertices.take().filter(is_same);
+                let numbers = || Numbers {
+                    points: points_of(points, &quantization),
+                    gradients: is_needed.then(|| gradients_of(gradients, &quantization)),
+                };
+                let (_, numbers) =
+                    self.vertices.insert(kept.unwrap_or_else(|| (content.revision, numbers())));
+                let gradients = numbers.gradients.as_deref().filter(|_| is_needed);
+                (numbers.points.as_slice(), gradients.unwrap_or_default())
+            }
+        };
+        let has_magnitudes = has_rows && !gradients.is_empty();
+        let revision = content.transfer.revision();
+        let is_same = |&(kept, magnitudes, _): &(Revision, bool, Table)| {
+            (kept, magnitudes) == (revision, has_magnitudes)
+        };
+        let kept = self.table.take().filter(is_same);
+        let table = || (revision, has_magnitudes, Table::new(content.transfer, has_magnitudes));
+        (&self.table.insert(kept.unwrap_or_else(table)).2, points, gradients)
     }
-    let view = View::new(frame, content, &points);
-    let vertices = view.vertices(level, &points);
-    let table = Table::new(content.transfer, has_rows && !gradients.is_empty());
+}
+
+/// Draws a checked part, which is the whole picture or one of several.
+pub(crate) fn draw(level: Level, kept: &mut Kept, target: &mut Target, content: &Sheets<'_>, is_whole: bool) {
+    let (table, points, gradients) = kept.of(content);
+    let view = View::new(&target.view, content, points);
+    let vertices = view.vertices(level, points);
     let num_attributes = match (gradients.is_empty(), content.light) {
         (true, _) => 2,
         (false, None) => 3,
         (false, Some(_)) => 6,
     };
-    let emitted = content.emitted();
-    let scene = Scene { content, surfaces, points, gradients, vertices, view, table, emitted };
+    let rise_behind = if is_whole { 0.0 } else { MAX_STRIP_DEPTH };
+    let scene = Scene { content, points, gradients, vertices, view, table, rise_behind };
     let bins = Bins::new(level, &scene);
     match num_attributes {
-        2 => draw_tiles::<2>(level, frame, &scene, &bins),
-        3 => draw_tiles::<3>(level, frame, &scene, &bins),
-        _ => draw_tiles::<6>(level, frame, &scene, &bins),
+        2 => draw_tiles::<2>(level, target, &scene, &bins),
+        3 => draw_tiles::<3>(level, target, &scene, &bins),
+        _ => draw_tiles::<6>(level, target, &scene, &bins),
     }
+    drop(scene);
+    kept.vertices.take_if(|(revision, _)| revision.is_none());
 }
 
-fn draw_tiles<const N: usize>(
-    level: Level,
-    frame: &Frame<'_>,
-    scene: &Scene<'_>,
-    bins: &Bins,
-) -> Vec<[f32; 3]> {
-    let columns = frame.width.div_ceil(TILE);
-    let tiles: Vec<Vec<[f32; 3]>> = (0..columns * frame.height.div_ceil(TILE))
-        .into_par_iter()
-        .map(|tile| {
-            let place = [tile % columns, tile / columns];
-            dispatch!(level, simd => simd.vectorize(
-                #[inline(always)]
-                || draw_tile::<_, N>(simd, scene, bins, tile, place)
-            ))
-        })
-        .collect();
-    assembled(frame, &tiles)
+fn draw_tiles<const N: usize>(level: Level, target: &mut Target, scene: &Scene<'_>, bins: &Bins) {
+    target.draw_tiles(|surfaces, number, first, tile| {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || draw_tile::<_, N>(simd, (scene, surfaces), bins, (number, first), tile)
+        ));
+    });
 }
 
 /// Draws one tile, whole even where it reaches over the edge of the picture.
 #[inline(always)]
 fn draw_tile<S: Simd, const N: usize>(
     simd: S,
-    scene: &Scene<'_>,
+    (scene, surfaces): (&Scene<'_>, &Surfaces),
     bins: &Bins,
-    tile: u32,
-    place: [u32; 2],
-) -> Vec<[f32; 3]> {
-    let first = place.map(|place| place * TILE);
-    let behind = tile_behind(scene.surfaces, first[0], first[1]);
-    if bins.of_tile(tile).all(<[Entry]>::is_empty) {
-        return behind;
+    (number, first): (u32, [u32; 2]),
+    tile: &mut Tile,
+) {
+    if bins.of_tile(number).all(<[Entry]>::is_empty) {
+        return;
     }
-    let pixels = (0..TILE * TILE).map(|i| [i % TILE, i / TILE]);
+    let places = (0..TILE * TILE).map(|i| [i % TILE, i / TILE]);
     let mut obliquities = [0.0; NUM_PIXELS];
-    for ([x, y], obliquity) in pixels.zip(&mut obliquities) {
+    for ([x, y], obliquity) in places.zip(&mut obliquities) {
         *obliquity = scene.view.obliquity(first[0] + x, first[1] + y);
     }
-    let ends = scene.ends(bins, tile, &obliquities);
-    let mut pixels = [[0.0, 0.0, 0.0, 1.0]; NUM_PIXELS];
-    let shading = Shading { table: &scene.table, light: scene.content.light, obliquities: &obliquities };
+    let ends = scene.ends(bins, number, &obliquities);
+    let mut pixels = tile.rows();
+    let shading = Shading { table: scene.table, light: scene.content.light, obliquities: &obliquities };
     let mut fragments = Fragments::<N>::new();
-    let mut open = u16::MAX;
+    let mut open = open_blocks(u16::MAX, &pixels, &ends);
     let mut num_batches = 0;
-    'tile: for entries in bins.of_tile(tile) {
+    'tile: for entries in bins.of_tile(number) {
         for entry in entries {
             if blocks(entry) & open == 0 {
                 continue;
@@ -157,10 +184,10 @@ fn draw_tile<S: Simd, const N: usize>(
                 for x in (left..=u32::from(entry.last[0])).step_by(packet.size[0] as usize) {
                     let start = fragments.len;
                     triangle.add(simd, packet, [x, y], entry.last, &mut fragments);
-                    if !scene.surfaces.is_empty() {
+                    if !surfaces.is_empty() {
                         let placed = scene.placed(entry);
                         let tile = (first, obliquities.as_slice());
-                        ends::cut(&scene.view, scene.surfaces, &placed, tile, (&mut fragments, start));
+                        ends::cut(&scene.view, surfaces, &placed, tile, (&mut fragments, start));
                     }
                     if fragments.is_full() {
                         shading.composite(simd, &mut fragments, &mut pixels);
@@ -178,16 +205,7 @@ fn draw_tile<S: Simd, const N: usize>(
         }
     }
     shading.composite(simd, &mut fragments, &mut pixels);
-    let [low, high] = scene.emitted;
-    let color = |(pixel, behind): (&[f32; 4], [f32; 3])| {
-        let within = |i: usize| {
-            let sum = pixel[i] + pixel[3] * behind[i];
-            // `max` takes the other where the sum is NaN.
-            sum.max(low[i].min(behind[i])).min(high[i].max(behind[i]))
-        };
-        [0, 1, 2].map(within)
-    };
-    pixels.iter().zip(behind).map(color).collect()
+    tile.set_rows(&pixels);
 }
 
 /// The blocks that a triangle's pixels may be in.
@@ -257,19 +275,24 @@ impl Scene<'_> {
         Triangle::new(vertices, attributes, first, (self.view.is_perspective, is_strip))
     }
 
-    /// The triangle of an entry in space.
-    fn placed(&self, entry: &Entry) -> Placed {
-        let corners = self.content.triangles[entry.triangle as usize].map(|vertex| {
+    /// A triangle in space, relative to the origin of the sheets.
+    fn corners(&self, numbers: [u32; 3]) -> [glam::DVec3; 3] {
+        numbers.map(|vertex| {
             let [x, y, z, _] = self.points[vertex as usize].map(f64::from);
             glam::DVec3::new(x, y, z)
-        });
+        })
+    }
+
+    /// The triangle of an entry in space.
+    fn placed(&self, entry: &Entry) -> Placed {
+        let corners = self.corners(self.content.triangles[entry.triangle as usize]);
         Placed { corners, is_slab: !self.content.sheets[entry.sheet as usize].is_strip() }
     }
 
     /// The transmittance of each block at which nothing behind can show.
     fn ends(&self, bins: &Bins, tile: u32, obliquities: &[f32]) -> [f32; 16] {
         // Optical depth that may be taken away.
-        let mut rises = [0.0_f32; 16];
+        let mut rises = [self.rise_behind; 16];
         let obliquity = obliquities.iter().copied().fold(1.0, f32::max);
         for entry in bins.of_tile(tile).flatten() {
             let [constant, slope] = self.content.sheets[entry.sheet as usize].thickness;
@@ -287,27 +310,17 @@ impl Scene<'_> {
     }
 }
 
-/// Vertices as numbers.
-fn points<'a>(vertices: &SheetVertices<'a>) -> Cow<'a, [[f32; 4]]> {
-    match *vertices {
-        SheetVertices::Exact { points, .. } => Cow::Borrowed(points),
-        SheetVertices::Quantized { points, quantization: Quantization { low, scale, .. }, .. } => {
-            let point = |point: &[u16; 4]| std::array::from_fn(|i| low[i] + scale[i] * f32::from(point[i]));
-            Cow::Owned(points.par_iter().map(point).collect())
-        }
-    }
+/// Quantised points as numbers.
+fn points_of(points: &[[u16; 4]], Quantization { low, scale, .. }: &Quantization) -> Vec<[f32; 4]> {
+    let point = |point: &[u16; 4]| std::array::from_fn(|i| low[i] + scale[i] * f32::from(point[i]));
+    points.par_iter().map(point).collect()
 }
 
-/// Directions and magnitudes of gradients as numbers.
-fn gradients<'a>(vertices: &SheetVertices<'a>) -> Cow<'a, [[f32; 4]]> {
-    match *vertices {
-        SheetVertices::Exact { gradients, .. } => Cow::Borrowed(gradients),
-        SheetVertices::Quantized { gradients, quantization, .. } => {
-            let gradient = |&[x, y, z, magnitude]: &[i8; 4]| {
-                let [x, y, z] = [x, y, z].map(|i| (f32::from(i) / 127.0).max(-1.0));
-                [x, y, z, quantization.magnitude_scale * f32::from(magnitude.cast_unsigned())]
-            };
-            Cow::Owned(gradients.par_iter().map(gradient).collect())
-        }
-    }
+/// Quantised directions and magnitudes of gradients as numbers.
+fn gradients_of(gradients: &[[i8; 4]], quantization: &Quantization) -> Vec<[f32; 4]> {
+    let gradient = |&[x, y, z, magnitude]: &[i8; 4]| {
+        let [x, y, z] = [x, y, z].map(|i| (f32::from(i) / 127.0).max(-1.0));
+        [x, y, z, quantization.magnitude_scale * f32::from(magnitude.cast_unsigned())]
+    };
+    gradients.par_iter().map(gradient).collect()
 }

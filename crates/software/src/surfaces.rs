@@ -17,7 +17,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_frame::Frame;
+use volery_frame::PictureView;
 use volery_scene::mesh::shade;
 use volery_scene::{Projection, RayGrid, TriangleMesh};
 
@@ -28,6 +28,7 @@ const ROWS: u32 = 16;
 const NEAR: f64 = 1e-9;
 
 /// What every pixel's ray ends at: a surface or the background.
+#[derive(Debug)]
 pub(crate) struct Surfaces {
     rays: RayGrid,
     width: u32,
@@ -40,34 +41,34 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// Those of a checked frame.
-    pub(crate) fn new(frame: &Frame<'_>) -> Self {
-        let view = View::new(frame);
-        let (rays, width, background) = (view.rays, frame.width, frame.background);
-        if frame.meshes.iter().all(|mesh| mesh.triangles().is_empty()) {
+    /// Those of a checked picture.
+    pub(crate) fn new(picture: &PictureView<'_>) -> Self {
+        let view = View::new(picture);
+        let (rays, width, background) = (view.rays, picture.width, picture.background);
+        if picture.meshes.iter().all(|mesh| mesh.triangles().is_empty()) {
             return Self { rays, width, background, depths: Vec::new(), colors: Vec::new() };
         }
-        let bands = view.bands(frame.meshes);
-        let num_pixels = frame.width as usize * frame.height as usize;
+        let bands = view.bands(picture.meshes);
+        let num_pixels = picture.width as usize * picture.height as usize;
         let mut depths = vec![f64::INFINITY; num_pixels];
-        let mut colors = vec![frame.background; num_pixels];
-        let band_pixels = (frame.width * ROWS) as usize;
+        let mut colors = vec![picture.background; num_pixels];
+        let band_pixels = (picture.width * ROWS) as usize;
         let pixels = depths.par_chunks_mut(band_pixels).zip(colors.par_chunks_mut(band_pixels));
         pixels.zip(bands).enumerate().for_each(|(band, ((depths, colors), listed))| {
             let first_row = band as u32 * ROWS;
             let mut nearest = vec![u32::MAX; depths.len()];
             for (place, footprint) in (0..).zip(&listed) {
-                let triangle = view.triangle(footprint.corners(frame.meshes));
+                let triangle = view.triangle(footprint.corners(picture.meshes));
                 triangle.draw(&view, footprint, first_row, depths, |pixel| nearest[pixel] = place);
             }
             for (pixel, (color, place)) in colors.iter_mut().zip(nearest).enumerate() {
                 let Some(footprint) = listed.get(place as usize) else { continue };
-                let [column, row] = [pixel as u32 % frame.width, first_row + pixel as u32 / frame.width];
-                let [a, b, c] = footprint.corners(frame.meshes);
+                let [column, row] = [pixel as u32 % picture.width, first_row + pixel as u32 / picture.width];
+                let [a, b, c] = footprint.corners(picture.meshes);
                 let normal = (b - a).cross(c - a).normalize_or_zero();
                 let shade = shade(normal.dot(view.rays.pixel(column, row).direction));
                 *color =
-                    frame.meshes[footprint.mesh as usize].color().map(|channel| (channel * shade) as f32);
+                    picture.meshes[footprint.mesh as usize].color().map(|channel| (channel * shade) as f32);
             }
         });
         Self { rays, width, background, depths, colors }
@@ -142,18 +143,18 @@ struct Triangle {
 }
 
 impl View {
-    fn new(frame: &Frame<'_>) -> Self {
-        let rays = frame.camera.rays(frame.width, frame.height);
-        let [_, _, forward] = frame.camera.axes();
+    fn new(picture: &PictureView<'_>) -> Self {
+        let rays = picture.camera.rays(picture.width, picture.height);
+        let [_, _, forward] = picture.camera.axes();
         Self {
             rays,
-            eye: frame.camera.eye,
+            eye: picture.camera.eye,
             forward,
             // One of the two is zero.
             pixels_per_length: [rays.toward_dx + rays.origin_dx, rays.toward_dy + rays.origin_dy]
                 .map(|pixel| pixel / pixel.length_squared()),
-            is_perspective: matches!(frame.camera.projection, Projection::Perspective { .. }),
-            size: [frame.width, frame.height],
+            is_perspective: matches!(picture.camera.projection, Projection::Perspective { .. }),
+            size: [picture.width, picture.height],
         }
     }
 

@@ -1,30 +1,27 @@
-//! The picture in tiles: which bricks a tile can meet, and the packets of a tile.
+//! Rays in tiles: which bricks a tile can meet, and the packets of a tile.
 
-use fearless_simd::{Level, dispatch, mask32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use glam::DVec3;
 use rayon::prelude::*;
 use volery_frame::ray_transfer::BinSet;
-use volery_frame::{DrawError, Frame, PlacedBrick, RayDoubt, RayTransfer, Rays, VolumeLayout};
+use volery_frame::{DrawError, PictureView, PlacedBrick, RayTransfer, Rays, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use crate::MIN_TRANSMITTANCE;
-use crate::brick::{Occupancy, StoredBrick, block_cells};
+use crate::brick::{Marks, StoredBrick, block_cells};
 use crate::exact::Bands;
-use crate::packet::{PACKET, Packet};
+use crate::math::axes;
+use crate::packet::Packet;
 use crate::pool::Bricks;
 use crate::surfaces::Surfaces;
+use crate::target::{self, PACKET, TILE, TILE_PACKETS, Target, Tile};
 use crate::texel::Texel;
 use crate::walk::{Light, Matter, Table, walk};
 
-/// Pixels of a tile per axis, a multiple of [`PACKET`].
-pub(crate) const TILE: u32 = 32;
-
-/// A brick of this frame that holds matter.
+/// A brick of this part that holds matter.
 struct Drawable<'a, T> {
     brick: &'a StoredBrick<T>,
-    occupancy: Occupancy,
-    /// Blocks that are too much for the table.
-    exact: Option<Occupancy>,
+    marks: Marks,
     level: u32,
     /// Lower and upper corner in finest cells.
     bounds: [[f64; 3]; 2],
@@ -41,19 +38,19 @@ struct Shared<'a, T> {
     surfaces: &'a Surfaces,
     table: Table<'a>,
     /// Front to back.
-    drawables: Vec<Drawable<'a, T>>,
+    drawables: &'a [Drawable<'a, T>],
 }
 
-/// Draws a checked frame.
+/// Draws a checked part.
 pub(crate) fn draw<T: Texel>(
     level: Level,
-    (frame, surfaces): (&Frame<'_>, &Surfaces),
+    target: &mut Target,
     content: &Rays<'_>,
     layout: &VolumeLayout,
     bricks: &Bricks<T>,
-) -> Result<(Vec<[f32; 3]>, RayDoubt), DrawError> {
+) -> Result<(), DrawError> {
     let Rays { transfer, bricks: placed_bricks } = *content;
-    let projector = Projector::new(frame, layout);
+    let projector = Projector::new(&target.view, layout);
     let stored: Vec<_> = placed_bricks
         .iter()
         .map(|placed| {
@@ -63,7 +60,7 @@ pub(crate) fn draw<T: Texel>(
     let exact: Vec<_> = (0..=placed_bricks.iter().map(|placed| placed.level).max().unwrap_or(0))
         .map(|level| transfer.exact_bins(layout, level))
         .collect();
-    let drawables = stored
+    let drawables: Vec<_> = stored
         .into_par_iter()
         .filter_map(|(placed, brick)| drawable(transfer, &exact, layout, &projector, placed, brick))
         .collect();
@@ -78,31 +75,13 @@ pub(crate) fn draw<T: Texel>(
             huge: transfer.huge_range() as f32,
         },
     };
-    let rays = frame.camera.rays(frame.width, frame.height);
-    let shared = Shared { layout, unit_length: transfer.unit_length(), rays, surfaces, table, drawables };
-
-    let columns = frame.width.div_ceil(TILE);
-    let tiles: Vec<(Vec<[f32; 3]>, RayDoubt)> = (0..columns * frame.height.div_ceil(TILE))
-        .into_par_iter()
-        .map(|i| dispatch!(level, simd => draw_tile(simd, &shared, i % columns, i / columns)))
-        .collect();
-    let (tiles, doubts): (Vec<_>, Vec<_>) = tiles.into_iter().unzip();
-    let doubt = doubts.into_iter().fold(RayDoubt::default(), RayDoubt::max);
-    Ok((assembled(frame, &tiles), doubt))
-}
-
-/// The picture of its tiles, [`TILE`] pixels square each, row by row.
-pub(crate) fn assembled(frame: &Frame<'_>, tiles: &[Vec<[f32; 3]>]) -> Vec<[f32; 3]> {
-    let columns = frame.width.div_ceil(TILE);
-    let mut pixels = Vec::with_capacity(frame.width as usize * frame.height as usize);
-    for y in 0..frame.height {
-        for x in (0..frame.width).step_by(TILE as usize) {
-            let tile = &tiles[(y / TILE * columns + x / TILE) as usize];
-            let start = (y % TILE * TILE) as usize;
-            pixels.extend_from_slice(&tile[start..start + (frame.width - x).min(TILE) as usize]);
-        }
-    }
-    pixels
+    let rays = target.view.camera.rays(target.view.width, target.view.height);
+    let (unit_length, drawables) = (transfer.unit_length(), drawables.as_slice());
+    target.draw_tiles(|surfaces, _, first, tile| {
+        let shared = Shared { layout, unit_length, rays, surfaces, table, drawables };
+        dispatch!(level, simd => draw_tile(simd, &shared, first, tile));
+    });
+    Ok(())
 }
 
 fn drawable<'a, T: Texel>(
@@ -119,9 +98,8 @@ fn drawable<'a, T: Texel>(
     let high = std::array::from_fn(|axis| f64::from(high[axis].min(held(axis))));
     let bounds = [low.map(f64::from), high];
     let tiles = projector.tiles(bounds)?;
-    let occupancy = brick.blocks(transfer, transfer.visible_bins())?;
-    let exact = brick.blocks(transfer, &exact[placed.level as usize]);
-    Some(Drawable { brick, occupancy, exact, level: placed.level, bounds, tiles })
+    let marks = brick.marks(transfer, &exact[placed.level as usize], placed.level)?;
+    Some(Drawable { brick, marks, level: placed.level, bounds, tiles })
 }
 
 /// Finds the tiles that a box can touch.
@@ -140,10 +118,10 @@ struct Projector {
 }
 
 impl Projector {
-    fn new(frame: &Frame<'_>, layout: &VolumeLayout) -> Self {
-        let [right, up, forward] = frame.camera.axes();
-        let rays = frame.camera.rays(frame.width, frame.height);
-        let perspective = matches!(frame.camera.projection, Projection::Perspective { .. });
+    fn new(picture: &PictureView<'_>, layout: &VolumeLayout) -> Self {
+        let [right, up, forward] = picture.camera.axes();
+        let rays = picture.camera.rays(picture.width, picture.height);
+        let perspective = matches!(picture.camera.projection, Projection::Perspective { .. });
         let (corner, step) =
             if perspective { (rays.toward, rays.toward_dx) } else { (DVec3::ZERO, rays.origin_dx) };
         Self {
@@ -155,7 +133,7 @@ impl Projector {
             pixel: step.length(),
             perspective,
             spacing: layout.spacing,
-            last_tile: [frame.width, frame.height].map(|n| (n - 1) / TILE),
+            last_tile: [picture.width, picture.height].map(|n| (n - 1) / TILE),
         }
     }
 
@@ -191,50 +169,23 @@ impl Projector {
     }
 }
 
-/// What is behind the matter of a tile that begins at `(column, row)`.
-pub(crate) fn tile_behind(surfaces: &Surfaces, column: u32, row: u32) -> Vec<[f32; 3]> {
-    (0..TILE * TILE).map(|pixel| surfaces.color(column + pixel % TILE, row + pixel / TILE)).collect()
-}
-
 /// Draws one tile, whole even where it reaches over the edge of the picture.
 #[inline(always)]
-fn draw_tile<S: Simd, T: Texel>(
-    simd: S,
-    shared: &Shared<'_, T>,
-    tile_x: u32,
-    tile_y: u32,
-) -> (Vec<[f32; 3]>, RayDoubt) {
-    let mut doubt = RayDoubt::default();
-    let [first_column, first_row] = [tile_x * TILE, tile_y * TILE];
-    let mut pixels = tile_behind(shared.surfaces, first_column, first_row);
+fn draw_tile<S: Simd, T: Texel>(simd: S, shared: &Shared<'_, T>, first: [u32; 2], tile: &mut Tile) {
+    let place = first.map(|pixel| pixel / TILE);
     let inside = |d: &Drawable<'_, T>| {
         let [[x0, y0], [x1, y1]] = d.tiles;
-        (x0..=x1).contains(&tile_x) && (y0..=y1).contains(&tile_y)
+        (x0..=x1).contains(&place[0]) && (y0..=y1).contains(&place[1])
     };
     let drawables: Vec<_> = shared.drawables.iter().filter(|d| inside(d)).collect();
     if drawables.is_empty() {
-        return (pixels, doubt);
+        return;
     }
-    for y in (0..TILE).step_by(PACKET as usize) {
-        for x in (0..TILE).step_by(PACKET as usize) {
-            let light = draw_packet(simd, shared, &drawables, first_column + x, first_row + y);
-            let [r, g, b]: [[f32; 16]; 3] = light.color.map(Into::into);
-            let clear: [f32; 16] = light.transmittance.into();
-            let worst = |lanes: [f32; 16]| lanes.into_iter().fold(0.0, f32::max);
-            doubt = doubt
-                .max(RayDoubt { cells: worst(light.doubt.into()), table_way: worst(light.table_way.into()) });
-            for lane in 0..16 {
-                let pixel = (y + lane as u32 / PACKET) * TILE + x + lane as u32 % PACKET;
-                let background = pixels[pixel as usize];
-                pixels[pixel as usize] = [
-                    r[lane] + clear[lane] * background[0],
-                    g[lane] + clear[lane] * background[1],
-                    b[lane] + clear[lane] * background[2],
-                ];
-            }
-        }
+    let (light, doubts) = tile.light_and_doubts();
+    for (packet, gathered) in (0..).zip(light.iter_mut().zip(doubts)) {
+        let [x, y] = [packet % TILE_PACKETS, packet / TILE_PACKETS].map(|place| place * PACKET);
+        draw_packet(simd, shared, &drawables, [first[0] + x, first[1] + y], gathered);
     }
-    (pixels, doubt)
 }
 
 #[inline(always)]
@@ -242,21 +193,29 @@ fn draw_packet<S: Simd, T: Texel>(
     simd: S,
     shared: &Shared<'_, T>,
     drawables: &[&Drawable<'_, T>],
-    column: u32,
-    row: u32,
-) -> Light<S> {
+    [column, row]: [u32; 2],
+    (gathered, doubts): (&mut target::Light, &mut target::Doubt),
+) {
     let unit_length = shared.unit_length;
     let rays = (&shared.rays, shared.surfaces);
     let packet = Packet::new(simd, rays, shared.layout, unit_length, column, row);
-    let mut light = Light::none(simd);
-    let mut wanted = mask32x16::splat(simd, true);
+    let mut light = Light {
+        color: axes(
+            #[inline(always)]
+            |i| f32x16::from_slice(simd, &gathered[i]),
+        ),
+        transmittance: f32x16::from_slice(simd, &gathered[3]),
+        doubt: f32x16::from_slice(simd, &doubts[0]),
+        table_way: f32x16::from_slice(simd, &doubts[1]),
+    };
+    let mut wanted = light.transmittance.simd_gt(MIN_TRANSMITTANCE);
     for drawable in drawables {
         let Some(span) = packet.meet(simd, drawable.bounds, drawable.level, wanted) else { continue };
         let matter = Matter {
             samples: drawable.brick.samples,
             texels: &drawable.brick.texels,
-            occupancy: &drawable.occupancy,
-            exact: drawable.exact.as_ref(),
+            occupancy: &drawable.marks.occupancy,
+            exact: drawable.marks.exact.as_ref(),
             block: block_cells(shared.layout.brick_cells),
         };
         simd.vectorize(
@@ -268,5 +227,7 @@ fn draw_packet<S: Simd, T: Texel>(
             break;
         }
     }
-    light
+    let [r, g, b] = light.color.map(Into::into);
+    *gathered = [r, g, b, light.transmittance.into()];
+    *doubts = [light.doubt.into(), light.table_way.into()];
 }

@@ -111,7 +111,7 @@ impl Table<'_> {
 }
 
 impl<S: Simd> Light<S> {
-    #[inline(always)]
+    #[cfg(test)]
     pub(crate) fn none(simd: S) -> Self {
         let zero = f32x16::splat(simd, 0.0);
         Self { color: [zero; 3], transmittance: f32x16::splat(simd, 1.0), doubt: zero, table_way: zero }

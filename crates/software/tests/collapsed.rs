@@ -1,7 +1,9 @@
 //! Pictures of cells that list nodes more than once, and of cells without volume.
 
 use glam::DVec3;
-use volery_frame::{Backend, Content, Frame, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{
+    Backend, Content, Counted, Frame, PictureView, Sheet, SheetTransfer, SheetVertices, Sheets,
+};
 use volery_scene::{Camera, CellType, Cells, Projection, UnstructuredGrid};
 use volery_slicing::{Planes, Slicer};
 use volery_software::SoftwareBackend;
@@ -39,12 +41,13 @@ fn picture(points: &[DVec3], cells: &[(CellType, Vec<u32>)], extinction: f32) ->
         first: sheet.triangles.start,
         count: sheet.triangles.end - sheet.triangles.start,
         thickness: sheet.thickness.map(|t| t as f32),
+        counted: Counted::All,
     };
     let sheets: Vec<_> = mesh.back_to_front(f64::NEG_INFINITY).map(sheet).collect();
     let entries = vec![[0.9, 0.1, 0.2, 0.5 * extinction], [0.1, 0.9, 0.8, extinction]];
     let transfer = SheetTransfer::of_entries(entries, 2, [0.0, 0.9], [0.0, 1.0]);
     let content = Content::Sheets(Sheets {
-        revision: 0,
+        revision: None,
         normal,
         origin: mesh.origin,
         vertices: SheetVertices::Exact { points: &mesh.points, gradients: &[] },
@@ -53,7 +56,10 @@ fn picture(points: &[DVec3], cells: &[(CellType, Vec<u32>)], extinction: f32) ->
         transfer: &transfer,
         light: None,
     });
-    let frame = Frame { width: SIDE, height: SIDE, camera, background: BACKGROUND, meshes: &[], content };
+    let frame = Frame {
+        view: PictureView { width: SIDE, height: SIDE, camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     SoftwareBackend::new().draw(&frame).expect("right sheets").image.pixels
 }
 

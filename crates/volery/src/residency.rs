@@ -3,6 +3,8 @@
 //! Bricks are read in parallel into a fixed number of buffers: [`BATCH_BYTES`] is all that uploading needs beside
 //! what the backend keeps. Where the backend's memory is full, it forgets what this frame does not need.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 use volery_frame::{Backend, BrickId, PlacedBrick, UploadError, VolumeLayout};
 use volery_pyramid::{Brick, Layout, Node, NodeSource, ReadError};
@@ -60,11 +62,21 @@ pub(crate) fn upload(
     }
     match upload_missing(source, encoding, nodes, backend) {
         Err(Error::Upload(UploadError::PoolFull { .. })) => {
-            backend.set_volume(layout)?;
+            evict_others(source.layout(), nodes, backend);
             upload_missing(source, encoding, nodes, backend)
         }
         other => other,
     }
+}
+
+/// Has the backend forget the bricks of all nodes but these.
+fn evict_others(layout: &Layout, nodes: &[Node], backend: &mut dyn Backend) {
+    let needed: HashSet<Node> = nodes.iter().copied().collect();
+    let numbers = Numbers::of(layout);
+    let all = (0..layout.num_levels()).flat_map(|level| layout.level_nodes(level));
+    let others = all.filter(|node| !needed.contains(node)).map(|node| numbers.id(layout, node));
+    let others: Vec<BrickId> = others.filter(|&id| backend.is_resident(id)).collect();
+    backend.evict(&others);
 }
 
 fn upload_missing(

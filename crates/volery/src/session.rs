@@ -11,7 +11,7 @@ mod times;
 use std::time::Instant;
 
 use glam::DVec3;
-use volery_frame::{Backend, Drawn, Frame, Image};
+use volery_frame::{Backend, Drawn, Frame, Image, PictureView};
 use volery_reference::metrics;
 use volery_scene::TransferFunction;
 
@@ -180,15 +180,14 @@ impl<D: Data> Session<D> {
         plan: &Plan,
         backend: &mut dyn Backend,
     ) -> Result<Drawn, RenderError> {
-        let frame = Frame {
+        let picture = PictureView {
             width: view.width,
             height: view.height,
             camera: view.camera,
             background: view.background.map(|c| c as f32),
             meshes: &view.meshes,
-            content: plan.drawing.content(),
         };
-        Ok(backend.draw(&frame)?)
+        Ok(backend.draw(&Frame { view: picture, content: plan.drawing.content() })?)
     }
 
     /// What was drawn, and the report of it.

@@ -3,7 +3,8 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use volery_frame::{
-    Backend, Content, Frame, Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets,
+    Backend, Content, Counted, Frame, Light, PictureView, Quantization, Revision, Sheet, SheetTransfer,
+    SheetVertices, Sheets,
 };
 use volery_scene::{Camera, Projection};
 use volery_wgpu::WgpuBackend;
@@ -45,7 +46,12 @@ impl Stack {
             })
         });
         let thickness = [2.0 / NUM_SHEETS as f32, 0.0];
-        let sheets = (0..NUM_SHEETS).map(|sheet| Sheet { first: sheet * count, count, thickness });
+        let sheets = (0..NUM_SHEETS).map(|sheet| Sheet {
+            first: sheet * count,
+            count,
+            thickness,
+            counted: Counted::All,
+        });
         Self {
             gradients: gradients.collect(),
             triangles: triangles.collect(),
@@ -90,7 +96,7 @@ fn draw(criterion: &mut Criterion) {
     let quantized = SheetVertices::Quantized { points: &points, gradients: &gradients, quantization };
     let light = Some(Light { toward: [0.0, 0.6, 0.8], ambient: 0.3, diffuse: 0.7 });
     let (values, magnitudes) = (table(4096, 1), table(256, 256));
-    let [once, twice] = [Sheets::next_revision(), Sheets::next_revision()];
+    let [once, twice] = [Some(Revision::new()), Some(Revision::new())];
     // A picture of 10 million fragments, and one of hardly any: what triangles cost alone.
     let camera = Camera {
         eye: DVec3::new(0.3, -0.4, 5.0),
@@ -116,7 +122,10 @@ fn draw(criterion: &mut Criterion) {
             transfer,
             light,
         });
-        let frame = Frame { width: size, height: size, camera, background: [0.0; 3], meshes: &[], content };
+        let frame = Frame {
+            view: PictureView { width: size, height: size, camera, background: [0.0; 3], meshes: &[] },
+            content,
+        };
         group.bench_function(BenchmarkId::new(name, size), |bencher| {
             bencher.iter(|| backend.draw(&frame).expect("right sheets"));
         });

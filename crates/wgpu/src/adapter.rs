@@ -21,6 +21,18 @@ pub enum OpenError {
         /// What there is.
         found: Vec<Device>,
     },
+    /// A device that is not good enough: see [`needed_limits`](crate::needed_limits).
+    #[error("device {name}: limit {limit} is {found}, expected at least {expected}")]
+    Limit {
+        /// Its name.
+        name: String,
+        /// Which limit.
+        limit: &'static str,
+        /// What it is.
+        found: u64,
+        /// What is needed.
+        expected: u64,
+    },
     /// The device did not open.
     #[error("device {name}: {reason}")]
     Device {
@@ -77,7 +89,7 @@ fn rank(kind: wgpu::DeviceType) -> u32 {
     }
 }
 
-fn device_of(info: &wgpu::AdapterInfo) -> Device {
+pub(crate) fn device_of(info: &wgpu::AdapterInfo) -> Device {
     let is_cpu = info.device_type == wgpu::DeviceType::Cpu;
     let kind = if is_cpu { DeviceKind::CpuDevice } else { DeviceKind::Gpu };
     Device { kind, name: info.name.clone() }

@@ -1,24 +1,24 @@
 //! The backend: one volume's bricks, and what of the last frame can be used again.
 
-use volery_frame::backend::check_frame;
+use volery_frame::backend::{check_content, check_view};
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Cubes, Device, DeviceKind, DrawError, Drawn, Frame, Image, PlacedBrick,
-    Planes, RayTransfer, Rays, Revision, Sheets, UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, PictureView,
+    Revision, UploadError, UploadedBytes, VolumeLayout,
 };
-use volery_shaders::raycast;
 
-use crate::adapter::{self, OpenError};
+use crate::adapter::{self, OpenError, device_of};
 use crate::cubes::CubeFans;
 use crate::gpu::{Failure, Gpu};
-use crate::picture::{Band, band_size, draw_in_bands};
+use crate::jobs::Jobs;
+use crate::needs;
+use crate::picture::{Finish, Kept, PartKind, Picture};
 use crate::plane::Plane;
 use crate::pool::Pool;
-use crate::raycast::{Form, Raycast, Resources, bands_buffer, transfer_texture, units_texture};
+use crate::present::Present;
+use crate::raycast::Raycast;
 use crate::sheets::SheetStacks;
 use crate::surfaces::Surfaces;
-use crate::tiles::{ANY_COLOR, Tiles};
-use crate::units::{Matter, Units};
-use crate::view::shader_frame;
+use crate::tiles::Tiles;
 
 /// Most pixels of a picture per axis.
 const MAX_SIZE: u32 = 16384;
@@ -33,20 +33,11 @@ pub struct WgpuBackend {
     sheets: SheetStacks,
     surfaces: Surfaces,
     pool: Option<Pool>,
-    prepared: Option<Prepared>,
-    band: Option<Band>,
-}
-
-/// What was made for the bricks and the transfer function of the last frame.
-struct Prepared {
-    generation: u64,
-    bricks: Vec<PlacedBrick>,
-    transfer: RayTransfer,
-    units: Units,
-    units_texture: wgpu::Texture,
-    transfer_texture: wgpu::Texture,
-    bands: wgpu::Buffer,
-    form: Form,
+    finish: Finish,
+    present: Present,
+    picture: Option<Picture>,
+    kept: Option<Kept>,
+    jobs: Jobs,
 }
 
 impl WgpuBackend {
@@ -66,8 +57,23 @@ impl WgpuBackend {
         Self::open(Some(kind))
     }
 
+    /// Draws on a device of somebody else's, who may go on using both, between any two calls. Its limits must be
+    /// [`needed_limits`](crate::needed_limits) or better; of [`USEFUL_FEATURES`](crate::USEFUL_FEATURES) those count that
+    /// it was opened with.
+    ///
+    /// # Errors
+    /// [`OpenError::Limit`], or [`OpenError::Device`] when it fails.
+    pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, OpenError> {
+        let info = device_of(&device.adapter_info());
+        Self::on(Gpu::of(device, queue, info))
+    }
+
     fn open(kind: Option<DeviceKind>) -> Result<Self, OpenError> {
-        let gpu = adapter::open(kind)?;
+        Self::on(adapter::open(kind)?)
+    }
+
+    fn on(gpu: Gpu) -> Result<Self, OpenError> {
+        needs::check(&gpu.info.name, &gpu.device.limits())?;
         let fail =
             |failure: Failure| OpenError::Device { name: gpu.info.name.clone(), reason: failure.to_string() };
         let raycast = Raycast::new(&gpu).map_err(fail)?;
@@ -76,6 +82,8 @@ impl WgpuBackend {
         let cubes = CubeFans::new(&gpu).map_err(fail)?;
         let sheets = SheetStacks::new(&gpu).map_err(fail)?;
         let surfaces = Surfaces::new(&gpu).map_err(fail)?;
+        let finish = Finish::new(&gpu).map_err(fail)?;
+        let present = Present::new(&gpu).map_err(fail)?;
         Ok(Self {
             gpu,
             raycast,
@@ -85,126 +93,64 @@ impl WgpuBackend {
             sheets,
             surfaces,
             pool: None,
-            prepared: None,
-            band: None,
+            finish,
+            present,
+            picture: None,
+            kept: None,
+            jobs: Jobs::default(),
         })
     }
 
-    /// Everything that depends on bricks and transfer function, made anew only where they changed.
-    fn prepare(&mut self, rays: &Rays<'_>) -> Result<(), Failure> {
-        let Some(pool) = &self.pool else { return Ok(()) };
-        let is_current = self.prepared.as_ref().is_some_and(|prepared| {
-            prepared.generation == pool.generation()
-                && prepared.bricks == rays.bricks
-                && prepared.transfer == *rays.transfer
-        });
-        if is_current {
-            return Ok(());
-        }
-        let (layout, resident) = (pool.layout(), pool.resident());
-        let units = Units::new(
-            &Matter { layout, resident, transfer: rays.transfer, slots_per_layer: pool.slots_per_layer() },
-            rays.bricks,
-        );
-        let max = self.gpu.device.limits().max_texture_dimension_3d;
-        if units.dims.iter().any(|&n| n > max) {
-            let [x, y, z] = units.dims;
-            return Err(Failure::Other(format!(
-                "volume of {x} x {y} x {z} units, expected at most {max} per axis"
-            )));
-        }
-        let has_blanks = rays.bricks.iter().any(|brick| resident[&brick.id].summary.has_blanks);
-        let gpu = &self.gpu;
-        let (units_texture, transfer_texture, bands) = gpu.checked(|| {
-            (
-                units_texture(gpu, &units),
-                transfer_texture(gpu, rays.transfer),
-                bands_buffer(gpu, rays.transfer),
-            )
-        })?;
-        let form = Form::new(layout, &units, has_blanks);
-        self.prepared = Some(Prepared {
-            generation: pool.generation(),
-            bricks: rays.bricks.to_vec(),
-            transfer: rays.transfer.clone(),
-            units,
-            units_texture,
-            transfer_texture,
-            bands,
-            form,
-        });
-        Ok(())
+    /// Ends the picture in a texture of the device, in place of reading it: in its upper left corner, which must have
+    /// room for it; the rest stays as it is. Colours are linear, opacity is 1; `format` is the view's, of any kind that
+    /// can be drawn to. Nobody waits: what is submitted to the queue afterwards finds the picture there.
+    ///
+    /// # Errors
+    /// [`DrawError::NoPicture`], or [`DrawError::Device`] when the texture is too small or cannot be drawn to, or the
+    /// device fails.
+    pub fn finish_into(
+        &mut self,
+        target: &wgpu::TextureView,
+        format: wgpu::TextureFormat,
+    ) -> Result<(), DrawError> {
+        let picture = self.picture.take().ok_or(DrawError::NoPicture)?;
+        let drawn = self.present.draw(&self.gpu, &mut self.jobs, &picture, (target, format));
+        self.kept = Some(picture.into_kept());
+        drawn.map_err(device)
     }
 
-    fn cast_rays(&mut self, frame: &Frame<'_>, rays: &Rays<'_>) -> Result<Drawn, Failure> {
-        if rays.bricks.is_empty() || self.pool.as_ref().is_none_or(|pool| pool.layout().cells.contains(&0)) {
-            return self.draw_surfaces(frame);
-        }
-        self.prepare(rays)?;
-        let (Some(pool), Some(prepared)) = (&self.pool, &self.prepared) else {
-            return self.draw_surfaces(frame);
-        };
-        let Some(atlas) = pool.texture() else { return self.draw_surfaces(frame) };
-        let gpu = &self.gpu;
-        let size = [frame.width, frame.height];
-        let surfaces = self.surfaces.of_frame(gpu, frame, band_size(gpu, size, raycast::TILE))?;
-        let form = Form { has_surfaces: !surfaces.is_empty(), ..prepared.form };
-        let pipeline = self.raycast.pipeline(gpu, form)?;
-        let held = (pool, &surfaces);
-        let mut shader_frame = shader_frame(frame, rays.transfer, pool.layout(), &prepared.units, held);
-        let Prepared { units_texture: units, transfer_texture: transfer, bands, .. } = prepared;
-        let raycast = &self.raycast;
-        let bind = |picture: &wgpu::Buffer, _| {
-            let surfaces = surfaces.view();
-            raycast.bind(gpu, &Resources { units, atlas, transfer, bands, picture, surfaces })
-        };
-        let passes = (raycast::TILE, &surfaces);
-        raycast.reset_doubt(gpu);
-        let drawn = draw_in_bands(gpu, &mut self.band, size, passes, bind, |pass, bound, rows| {
-            (shader_frame.first_row, shader_frame.end_row) = (rows.start, rows.end);
-            raycast.set_frame(gpu, &shader_frame);
-            Raycast::encode(pass, &pipeline, bound, &shader_frame);
-        })?;
-        Ok(Drawn { ray_doubt: Some(raycast.doubt(gpu)?), ..drawn })
-    }
-
-    fn draw_planes(&mut self, frame: &Frame<'_>, planes: &Planes<'_>) -> Result<Drawn, Failure> {
-        match &self.pool {
-            Some(pool) if !planes.bricks.is_empty() && !planes.planes.is_empty() => {
-                let kept = (&mut self.band, &mut self.surfaces);
-                self.plane.draw(&self.gpu, pool, kept, frame, planes)
+    /// Adds a checked part to a picture.
+    fn add(&mut self, picture: &mut Picture, content: &Content<'_>) -> Result<u32, Failure> {
+        let Self { gpu, raycast, plane, tiles, cubes, sheets, pool, jobs, .. } = self;
+        match (content, pool) {
+            (Content::Rays(content), Some(pool)) if !content.bricks.is_empty() => {
+                raycast.add(gpu, pool, (picture, jobs), content)
             }
-            _ => self.draw_surfaces(frame),
-        }
-    }
-
-    fn draw_cubes(&mut self, frame: &Frame<'_>, cubes: &Cubes<'_>) -> Result<Drawn, Failure> {
-        match &self.pool {
-            Some(pool) if !cubes.cubes.is_empty() => {
-                let surfaces = self.surfaces.of_frame(&self.gpu, frame, Tiles::size(frame))?;
-                let kept = (&mut self.tiles, &mut self.band);
-                self.cubes.draw(&self.gpu, pool.layout(), kept, (frame, &surfaces), cubes)
+            (Content::Rays(_), _) => Ok(picture.add_nothing(jobs, PartKind::RAYS)),
+            (Content::Planes(content), Some(pool))
+                if !content.bricks.is_empty() && !content.planes.is_empty() =>
+            {
+                plane.add(gpu, pool, (picture, jobs), content)
             }
-            _ => self.draw_surfaces(frame),
+            (Content::Cubes(content), Some(pool)) if !content.cubes.is_empty() => {
+                cubes.add(gpu, pool.layout(), tiles, (picture, jobs), content)
+            }
+            (Content::Sheets(content), _) if content.sheets.iter().any(|sheet| sheet.count > 0) => {
+                sheets.add(gpu, tiles, (picture, jobs), content)
+            }
+            (Content::Sheets(content), _) => Ok(picture.add_nothing(jobs, PartKind::sheets(content))),
+            (Content::Planes(_) | Content::Cubes(_), _) => Ok(picture.add_nothing(jobs, PartKind::default())),
         }
     }
 
-    fn draw_sheets(&mut self, frame: &Frame<'_>, sheets: &Sheets<'_>) -> Result<Drawn, Failure> {
-        if sheets.sheets.iter().all(|sheet| sheet.count == 0) {
-            return self.draw_surfaces(frame);
-        }
-        let surfaces = self.surfaces.of_frame(&self.gpu, frame, Tiles::size(frame))?;
-        let kept = (&mut self.tiles, &mut self.band);
-        self.sheets.draw(&self.gpu, kept, (frame, &surfaces), sheets)
-    }
-
-    /// The picture of a frame whose content shows nothing.
-    fn draw_surfaces(&mut self, frame: &Frame<'_>) -> Result<Drawn, Failure> {
-        let surfaces = self.surfaces.of_frame(&self.gpu, frame, Tiles::size(frame))?;
-        if surfaces.is_empty() {
-            return Ok(background(frame));
-        }
-        self.tiles.draw(&self.gpu, &mut self.band, (frame, &surfaces), ANY_COLOR, |_| (), |_, ()| ())
+    /// Begins a picture of a checked view.
+    fn begin_picture(&mut self, view: &PictureView<'_>) -> Result<Picture, Failure> {
+        let kept = match self.kept.take().filter(|kept| kept.fits(view)) {
+            Some(kept) => kept,
+            None => Kept::new(&self.gpu, [view.width, view.height])?,
+        };
+        let surfaces = self.surfaces.draw(&self.gpu, &mut self.jobs, view, kept.tiles())?;
+        Ok(Picture::new(view, kept, surfaces))
     }
 }
 
@@ -215,7 +161,7 @@ impl Backend for WgpuBackend {
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
         let pool = Pool::new(&self.gpu, layout)?;
-        self.prepared = None;
+        self.raycast.forget();
         self.plane.forget();
         self.pool = Some(pool);
         Ok(())
@@ -237,28 +183,57 @@ impl Backend for WgpuBackend {
         }
     }
 
+    fn evict(&mut self, bricks: &[BrickId]) {
+        if let Some(pool) = &mut self.pool {
+            pool.evict(bricks);
+        }
+    }
+
     fn resident_bytes(&self) -> u64 {
         self.pool.as_ref().map_or(0, Pool::resident_bytes)
     }
 
-    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
-        check_frame(frame, self.pool.as_ref().map(Pool::layout), MAX_SIZE)?;
-        if let Some(brick) = frame.content.bricks().find(|brick| !self.is_resident(brick.id)) {
+    fn uploaded_bytes(&self) -> UploadedBytes {
+        self.gpu.uploaded()
+    }
+
+    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
+        self.kept = self.picture.take().map(Picture::into_kept).or(self.kept.take());
+        self.jobs.clear();
+        check_view(view, MAX_SIZE)?;
+        self.picture = Some(self.begin_picture(view).map_err(device)?);
+        Ok(())
+    }
+
+    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
+        if self.picture.is_none() {
+            return Err(DrawError::NoPicture);
+        }
+        check_content(content, self.pool.as_ref().map(Pool::layout))?;
+        if let Some(brick) = content.bricks().find(|brick| !self.is_resident(brick.id)) {
             return Err(DrawError::NotResident { id: brick.id });
         }
-        let drawn = match &frame.content {
-            Content::Rays(rays) => self.cast_rays(frame, rays),
-            Content::Planes(planes) => self.draw_planes(frame, planes),
-            Content::Cubes(cubes) => self.draw_cubes(frame, cubes),
-            Content::Sheets(sheets) => self.draw_sheets(frame, sheets),
-        };
-        drawn.map_err(|failure| DrawError::Device(failure.to_string()))
+        // A picture in which the device failed is dropped.
+        let mut picture = self.picture.take().ok_or(DrawError::NoPicture)?;
+        let number = self.add(&mut picture, content).map_err(device)?;
+        self.picture = Some(picture);
+        Ok(number)
+    }
+
+    fn finished(&mut self) -> Vec<FinishedPart> {
+        // A device that fails here tells the next who asks something of it.
+        let _ = self.jobs.look(&self.gpu);
+        self.jobs.take_told()
+    }
+
+    fn finish(&mut self) -> Result<Drawn, DrawError> {
+        let picture = self.picture.take().ok_or(DrawError::NoPicture)?;
+        let drawn = self.finish.read(&self.gpu, &mut self.jobs, &picture).map_err(device)?;
+        self.kept = Some(picture.into_kept());
+        Ok(drawn)
     }
 }
 
-/// The picture of nothing.
-fn background(frame: &Frame<'_>) -> Drawn {
-    let (width, height) = (frame.width, frame.height);
-    let pixels = vec![frame.background; width as usize * height as usize];
-    Drawn { image: Image { width, height, pixels }, device_seconds: None, ray_doubt: None }
+fn device(failure: Failure) -> DrawError {
+    DrawError::Device(failure.to_string())
 }

@@ -5,7 +5,7 @@ use std::num::NonZeroU64;
 use volery_shaders::{Binding, BindingKind, Dimension, Stages, TexelKind};
 use wgpu::util::DeviceExt as _;
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Upload};
 
 /// The layout of a shader's only group.
 pub(crate) fn bind_group_layout(
@@ -82,12 +82,15 @@ pub(crate) fn shader_module(gpu: &Gpu, label: &str, source: &'static str) -> wgp
     gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
 }
 
+/// A buffer with contents, counted as one kind.
 pub(crate) fn buffer<T: bytemuck::NoUninit>(
     gpu: &Gpu,
+    kind: Upload,
     label: &str,
     contents: &[T],
     usage: wgpu::BufferUsages,
 ) -> wgpu::Buffer {
-    let contents = bytemuck::cast_slice(contents);
+    let contents: &[u8] = bytemuck::cast_slice(contents);
+    gpu.count(kind, contents.len());
     gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
 }

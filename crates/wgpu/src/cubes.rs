@@ -10,15 +10,15 @@
 //! to 1 is wrong by up to 1/4096 for each cube that a ray meets.
 
 use volery_cubefan::table::{ASPECTS, CORNERS, NUM_VERTICES, TRIANGLES};
-use volery_frame::{Cube, Cubes, Drawn, Frame, Thickness, VolumeLayout};
+use volery_frame::{Cube, Cubes, Revision, Thickness, VolumeLayout};
 use volery_shaders::cubes;
 
 use crate::bindings::{bind_group, bind_group_layout, buffer, shader_module};
 use crate::fan_view::shader_frame;
-use crate::gpu::{Failure, Gpu};
-use crate::picture::Band;
-use crate::surfaces::FrameSurfaces;
-use crate::tiles::{ANY_COLOR, Tiles, matter_pipeline};
+use crate::gpu::{Failure, Gpu, Upload};
+use crate::jobs::Jobs;
+use crate::picture::{PartKind, Picture};
+use crate::tiles::{Tiles, matter_pipeline};
 
 // What the shader and the rest of the crates must mean alike.
 const _: () = assert!(cubes::NUM_VERTICES as usize == NUM_VERTICES);
@@ -49,6 +49,8 @@ pub(crate) struct CubeFans {
     aspects: wgpu::Buffer,
     indices: wgpu::Buffer,
     chunks: Vec<wgpu::Buffer>,
+    /// What the chunks hold, if it has a name.
+    held: Option<Revision>,
 }
 
 impl CubeFans {
@@ -57,25 +59,41 @@ impl CubeFans {
             layout: bind_group_layout(&gpu.device, "volery cubes", cubes::BINDINGS),
             module: shader_module(gpu, cubes::LABEL, cubes::SOURCE),
             pipelines: [[None, None], [None, None]],
-            aspects: buffer(gpu, "volery cube aspects", &aspects(), wgpu::BufferUsages::STORAGE),
-            indices: buffer(gpu, "volery cube indices", &batch_indices(), wgpu::BufferUsages::INDEX),
+            aspects: buffer(
+                gpu,
+                Upload::Geometry,
+                "volery cube aspects",
+                &aspects(),
+                wgpu::BufferUsages::STORAGE,
+            ),
+            indices: buffer(
+                gpu,
+                Upload::Geometry,
+                "volery cube indices",
+                &batch_indices(),
+                wgpu::BufferUsages::INDEX,
+            ),
             chunks: Vec::new(),
+            held: None,
         })
     }
 
-    /// Draws a checked frame of cubes.
-    pub(crate) fn draw(
+    /// Adds a checked part of cubes to a picture.
+    pub(crate) fn add(
         &mut self,
         gpu: &Gpu,
         layout: &VolumeLayout,
-        (tiles, band): (&mut Tiles, &mut Option<Band>),
-        (frame, surfaces): (&Frame<'_>, &FrameSurfaces<'_>),
+        tiles: &mut Tiles,
+        (picture, jobs): (&mut Picture, &mut Jobs),
         content: &Cubes<'_>,
-    ) -> Result<Drawn, Failure> {
-        let pipeline = self.pipeline(gpu, content.thickness, !surfaces.is_empty())?;
-        let chunks = gpu.checked(|| self.hold(gpu, content.cubes))?;
-        let bind = |tile| self.bind(gpu, &shader_frame(frame, layout, surfaces, tile), surfaces.view());
-        tiles.draw(gpu, band, (frame, surfaces), ANY_COLOR, bind, |pass, fans: &Vec<wgpu::BindGroup>| {
+    ) -> Result<u32, Failure> {
+        let pipeline = self.pipeline(gpu, content.thickness, !picture.surfaces.is_empty())?;
+        let chunks = gpu.checked(|| self.hold(gpu, content))?;
+        let bind = |picture: &Picture, place: usize| {
+            let frame = shader_frame(picture, layout, picture.tiles[place].tile);
+            self.bind(gpu, &frame, picture.surfaces.of_tile(place))
+        };
+        tiles.add(gpu, (picture, jobs), PartKind::default(), bind, |pass, fans: &Vec<wgpu::BindGroup>| {
             pass.set_pipeline(&pipeline);
             pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
             for (bound, &num_cubes) in fans.iter().zip(&chunks) {
@@ -85,15 +103,20 @@ impl CubeFans {
         })
     }
 
-    /// Uploads cubes in chunks that bindings can hold; the numbers of cubes in each.
-    fn hold(&mut self, gpu: &Gpu, cubes: &[Cube]) -> Vec<u32> {
+    /// Uploads cubes, unless they are there, in chunks that bindings can hold; the numbers of cubes in each.
+    fn hold(&mut self, gpu: &Gpu, &Cubes { revision, cubes, .. }: &Cubes<'_>) -> Vec<u32> {
         let batch_bytes = u64::from(cubes::BATCH) * size_of::<Cube>() as u64;
         let limits = gpu.device.limits();
         let most_bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         let batches = CHUNK_BATCHES.min(most_bytes / batch_bytes).max(1);
         let chunks = cubes.chunks((batches * u64::from(cubes::BATCH)) as usize);
+        let num_cubes = chunks.clone().map(|chunk| chunk.len() as u32).collect();
+        if revision.is_some() && std::mem::replace(&mut self.held, revision) == revision {
+            return num_cubes;
+        }
+        self.held = revision;
         self.chunks.truncate(chunks.len());
-        for (place, chunk) in chunks.clone().enumerate() {
+        for (place, chunk) in chunks.enumerate() {
             let contents: &[u8] = bytemuck::cast_slice(chunk);
             let bytes = (contents.len() as u64).next_multiple_of(batch_bytes);
             if self.chunks.get(place).is_none_or(|held| held.size() < bytes) {
@@ -106,14 +129,15 @@ impl CubeFans {
                 self.chunks.truncate(place);
                 self.chunks.push(held);
             }
+            gpu.count(Upload::Geometry, contents.len());
             gpu.queue.write_buffer(&self.chunks[place], 0, contents);
         }
-        chunks.map(|chunk| chunk.len() as u32).collect()
+        num_cubes
     }
 
     /// What a tile binds with each chunk of cubes.
     fn bind(&self, gpu: &Gpu, frame: &cubes::Frame, surfaces: &wgpu::TextureView) -> Vec<wgpu::BindGroup> {
-        let frame = buffer(gpu, "volery cubes frame", &[*frame], wgpu::BufferUsages::UNIFORM);
+        let frame = buffer(gpu, Upload::Views, "volery cubes frame", &[*frame], wgpu::BufferUsages::UNIFORM);
         // A binding that the shader gains and this does not know fails as one of the wrong kind.
         let bind = |held: &wgpu::Buffer| {
             bind_group(gpu, &self.layout, cubes::BINDINGS, |name| match name {

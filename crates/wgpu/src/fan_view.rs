@@ -2,11 +2,11 @@
 
 use glam::{DVec3, IVec3};
 use volery_cubefan::LatticeEye;
-use volery_frame::{Frame, VolumeLayout};
+use volery_frame::VolumeLayout;
 use volery_shaders::cubes;
 
-use crate::surfaces::FrameSurfaces;
-use crate::tiles::{Affine, Tile, TileView};
+use crate::picture::{Picture, Tile};
+use crate::tiles::{Affine, TileView};
 
 /// An eye beyond the domain by so many lattice planes is far: places are then told from the domain's end.
 const FAR_PLANES: i32 = 64;
@@ -15,12 +15,8 @@ const FAR_PLANES: i32 = 64;
 const TINY: f64 = cubes::TINY as f64;
 
 /// The shader's frame for a tile.
-pub(crate) fn shader_frame(
-    frame: &Frame<'_>,
-    layout: &VolumeLayout,
-    surfaces: &FrameSurfaces<'_>,
-    tile: Tile,
-) -> cubes::Frame {
+pub(crate) fn shader_frame(picture: &Picture, layout: &VolumeLayout, tile: Tile) -> cubes::Frame {
+    let Picture { view: frame, surfaces, .. } = picture;
     let unit = layout.spacing.max_element() / 2.0;
     let step = layout.spacing / layout.spacing.max_element();
     let lattice_eye = LatticeEye::new(frame.camera.eye.to_array(), (layout.spacing / 2.0).to_array());

@@ -1,17 +1,32 @@
 //! An open device, and the catching of its errors: wgpu reports them out of band, and panics on those that
 //! nobody catches.
 
+use std::cell::Cell;
 use std::sync::{Arc, Mutex};
 
-use volery_frame::Device;
+use volery_frame::{Device, UploadedBytes};
+
+use crate::needs::USEFUL_FEATURES;
 
 /// An open device.
 pub(crate) struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     pub(crate) info: Device,
+    uploaded: Cell<UploadedBytes>,
     /// What went wrong outside of any check, until somebody asks.
     stray: Arc<Mutex<Option<String>>>,
+}
+
+/// A number of [`UploadedBytes`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Upload {
+    Bricks,
+    Places,
+    Choices,
+    Transfers,
+    Geometry,
+    Views,
 }
 
 /// What a device reports.
@@ -32,12 +47,9 @@ impl std::fmt::Display for Failure {
 
 impl Gpu {
     pub(crate) fn open(adapter: &wgpu::Adapter, info: Device) -> Result<Self, String> {
-        let useful = wgpu::Features::TIMESTAMP_QUERY
-            | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM
-            | wgpu::Features::FLOAT32_BLENDABLE;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("volery"),
-            required_features: adapter.features() & useful,
+            required_features: adapter.features() & USEFUL_FEATURES,
             required_limits: adapter.limits(),
             ..Default::default()
         };
@@ -57,11 +69,39 @@ impl Gpu {
                 keep(&lost, format!("lost: {text}"));
             }
         });
-        Ok(Self { device, queue, info, stray })
+        Ok(Self { device, queue, info, uploaded: Cell::default(), stray })
     }
 
     pub(crate) fn has(&self, features: wgpu::Features) -> bool {
         self.device.features().contains(features)
+    }
+
+    /// A device of somebody else's, who hears of what goes wrong outside of any check.
+    pub(crate) fn of(device: wgpu::Device, queue: wgpu::Queue, info: Device) -> Self {
+        Self { device, queue, info, uploaded: Cell::default(), stray: Arc::default() }
+    }
+
+    /// Counts bytes on their way to the device.
+    pub(crate) fn count(&self, kind: Upload, bytes: usize) {
+        let mut uploaded = self.uploaded.get();
+        let UploadedBytes { bricks, places, choices, transfers, geometry, views } = &mut uploaded;
+        *match kind {
+            Upload::Bricks => bricks,
+            Upload::Places => places,
+            Upload::Choices => choices,
+            Upload::Transfers => transfers,
+            Upload::Geometry => geometry,
+            Upload::Views => views,
+        } += bytes as u64;
+        self.uploaded.set(uploaded);
+    }
+
+    pub(crate) fn uploaded(&self) -> UploadedBytes {
+        self.uploaded.get()
+    }
+
+    pub(crate) fn has_clock(&self) -> bool {
+        self.has(wgpu::Features::TIMESTAMP_QUERY)
     }
 
     /// Runs calls to the device, and returns the first error that they cause.
@@ -87,7 +127,16 @@ impl Gpu {
 
     /// Waits until the device has done all that was submitted.
     pub(crate) fn wait(&self) -> Result<(), Failure> {
-        match self.device.poll(wgpu::PollType::wait_indefinitely()) {
+        self.poll_as(wgpu::PollType::wait_indefinitely())
+    }
+
+    /// Hears what the device has done, without waiting.
+    pub(crate) fn poll(&self) -> Result<(), Failure> {
+        self.poll_as(wgpu::PollType::Poll)
+    }
+
+    fn poll_as(&self, kind: wgpu::PollType) -> Result<(), Failure> {
+        match self.device.poll(kind) {
             Ok(_) => Ok(()),
             Err(error) => Err(Failure::Other(one_line(&error.to_string()))),
         }

@@ -13,6 +13,14 @@
 //! and 250 ms with a loop over cells inside a loop over blocks, where the rays of a SIMD group wait for one
 //! another.
 //!
+//! A picture lies in tiles of at most 64 MiB, in each the colour that pixels have gathered and the light that is left, in
+//! 32 bits: parts go to the device one after the other, and nobody waits for them. What is rendered, not traced, is
+//! rendered over nothing and then put behind what is there. The end puts surfaces or the background behind all and is
+//! read back, or drawn into a texture of somebody else's.
+//!
+//! What does not depend on the camera is sent once: bricks, where they are, tables, cubes, sheets and surfaces, told by
+//! revisions. A camera that moves sends how a part is seen, and a bit per brick where it shows some of them only.
+//!
 //! Rays are rebased in f64 to a start near the volume before they become f32, so an eye a million cells away
 //! loses nothing. Light accumulates in 32 bits as differences of transmittance, which add up exactly. A ray
 //! stops once it lets 1/4096 of the light through.
@@ -40,7 +48,7 @@
 //! device.
 //!
 //! # Limits
-//! Bricks of at most about 400 cells, and a pool of at most about 2 GB of 8-bit texels, where textures have 8192
+//! A device needs what `needed_limits` says. Bricks of at most about 400 cells, and a pool of at most about 2 GB of 8-bit texels, where textures have 8192
 //! texels per axis and 256 layers. Positions are f32: to a thousandth of a cell in volumes of 10,000 cells.
 //!
 //! # Non-goals
@@ -50,12 +58,17 @@ mod adapter;
 mod backend;
 mod bindings;
 mod blocks;
+mod choice;
 mod cubes;
 mod fan_view;
 mod gpu;
+mod jobs;
+mod needs;
 mod picture;
+mod placed;
 mod plane;
 mod pool;
+mod present;
 mod raycast;
 mod sheets;
 mod surfaces;
@@ -65,6 +78,7 @@ mod view;
 
 pub use adapter::{OpenError, adapters};
 pub use backend::WgpuBackend;
+pub use needs::{USEFUL_FEATURES, needed_limits};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

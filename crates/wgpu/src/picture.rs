@@ -1,216 +1,331 @@
-//! The picture on its way back: drawn in bands of rows, so that neither the size of a buffer nor the patience
-//! of a driver limits it, and read as f32.
+//! The picture under way: tiles, in each what its pixels have gathered; and its end.
+//!
+//! # Method
+//! No buffer holds a large picture, so it lies in tiles of at most 64 MiB. A part goes to the device tile by tile, and
+//! nobody waits for it. At the end each tile is put before surfaces or background and read, or shown in a texture.
 
-use std::ops::Range;
-use std::sync::mpsc;
+use volery_frame::{Drawn, Image, PictureView, Sheets};
+use volery_shaders::finish;
 
-use volery_frame::{Drawn, Image};
+use crate::bindings::{bind_group, bind_group_layout, buffer, pipeline_layout, shader_module};
+use crate::gpu::{Failure, Gpu, Upload};
+use crate::jobs::{Clock, Jobs, Slip};
+use crate::surfaces::PictureSurfaces;
 
-use crate::gpu::{Failure, Gpu};
-use crate::surfaces::FrameSurfaces;
-use crate::tiles::Tile;
+/// Most pixels of a tile per axis.
+const TILE: u32 = 2048;
 
-/// Bytes of a pixel: three f32.
+/// Bytes of what a pixel has gathered, and of what is read of it.
+const GATHERED_BYTES: u64 = 16;
 const PIXEL_BYTES: u64 = 12;
 
-/// Most bytes of a band.
-const BAND_BYTES: u64 = 64 << 20;
+/// The least and the largest number of each channel that may be shown.
+type Colors = [[f32; 3]; 2];
 
-/// Bytes of the two timestamps behind the pixels in the staging buffer.
-const STAMP_BYTES: u64 = 16;
+/// Whatever is shown.
+const ANY_COLOR: Colors = [[f32::MIN; 3], [f32::MAX; 3]];
 
-/// Buffers for one band, and the clock.
-pub(crate) struct Band {
-    pixels: wgpu::Buffer,
-    staging: wgpu::Buffer,
-    stamps: Option<Stamps>,
-    bytes: u64,
+/// A part of the area of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Tile {
+    /// Column and row of its first pixel.
+    pub(crate) first: [u32; 2],
+    /// Pixels.
+    pub(crate) size: [u32; 2],
 }
 
-struct Stamps {
-    queries: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-}
-
-/// Pixels of the bands of a picture, the last of which may have fewer rows.
-pub(crate) fn band_size(gpu: &Gpu, [width, height]: [u32; 2], tile: u32) -> [u32; 2] {
-    [width, rows_per_band(gpu, width, height, tile).min(height)]
-}
-
-/// Rows of a band in pictures of this width: multiples of a tile.
-fn rows_per_band(gpu: &Gpu, width: u32, height: u32, tile: u32) -> u32 {
-    let limits = gpu.device.limits();
-    let bytes = BAND_BYTES.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
-    let rows = bytes / (u64::from(width) * PIXEL_BYTES);
-    let rows = u32::try_from(rows).unwrap_or(u32::MAX).min(height.next_multiple_of(tile));
-    (rows / tile).max(1) * tile
-}
-
-/// Where the passes of a band write their times, if the device has a clock.
-#[derive(Clone, Copy)]
-pub(crate) struct Clock<'a>(Option<&'a wgpu::QuerySet>);
-
-impl<'a> Clock<'a> {
-    /// For the first pass of several.
-    pub(crate) fn at_start(self) -> Option<wgpu::RenderPassTimestampWrites<'a>> {
-        self.0.map(|query_set| wgpu::RenderPassTimestampWrites {
-            query_set,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: None,
+impl Tile {
+    /// The tiles of a picture, of at most `most` pixels per axis.
+    fn of_picture([width, height]: [u32; 2], most: u32) -> impl Iterator<Item = Self> {
+        (0..height).step_by(most as usize).flat_map(move |row| {
+            let columns = (0..width).step_by(most as usize);
+            columns.map(move |column| Self {
+                first: [column, row],
+                size: [most.min(width - column), most.min(height - row)],
+            })
         })
     }
 
-    /// For the last pass of several.
-    pub(crate) fn at_end(self) -> Option<wgpu::ComputePassTimestampWrites<'a>> {
-        self.0.map(|query_set| wgpu::ComputePassTimestampWrites {
-            query_set,
-            beginning_of_pass_write_index: None,
-            end_of_pass_write_index: Some(1),
-        })
+    fn num_pixels(self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1])
     }
 }
 
-/// Draws a picture band by band, its surfaces and then the rest in one compute pass each: for a range of rows, `bind`
-/// gets the buffer to fill, `encode` adds the commands. Buffers are taken from `kept` where they fit, and left there.
-pub(crate) fn draw_in_bands(
-    gpu: &Gpu,
-    kept: &mut Option<Band>,
+/// A tile of a picture on the device.
+pub(crate) struct PictureTile {
+    pub(crate) tile: Tile,
+    /// Colour and transmittance of each pixel.
+    pub(crate) gathered: wgpu::Buffer,
+}
+
+/// Tiles that the next picture of that size can take over.
+pub(crate) struct Kept {
     size: [u32; 2],
-    (tile, surfaces): (u32, &FrameSurfaces<'_>),
-    mut bind: impl FnMut(&wgpu::Buffer, Range<u32>) -> wgpu::BindGroup,
-    mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, &wgpu::BindGroup, Range<u32>),
-) -> Result<Drawn, Failure> {
-    let bind = |picture: &wgpu::Buffer, rows: Range<u32>| {
-        let band =
-            Tile { first: [0, rows.start], size: [size[0], rows.end - rows.start], picture_width: size[0] };
-        (bind(picture, rows), surfaces.bind(band))
-    };
-    draw_bands_in_passes(gpu, kept, size, tile, bind, |encoder, clock, (bound, behind), rows| {
-        if let Some(behind) = behind {
-            surfaces.encode(encoder, clock.at_start(), behind);
-        }
-        let timestamp_writes = clock.at_end().map(|writes| wgpu::ComputePassTimestampWrites {
-            beginning_of_pass_write_index: behind.is_none().then_some(0),
-            ..writes
-        });
-        let descriptor = wgpu::ComputePassDescriptor { label: Some("volery picture"), timestamp_writes };
-        encode(&mut encoder.begin_compute_pass(&descriptor), bound, rows);
-    })
+    tiles: Vec<PictureTile>,
 }
 
-/// As [`draw_in_bands`] in passes of any kind and number; the first and the last one must look at the clock.
-pub(crate) fn draw_bands_in_passes<B>(
-    gpu: &Gpu,
-    kept: &mut Option<Band>,
-    [width, height]: [u32; 2],
-    tile: u32,
-    mut bind: impl FnMut(&wgpu::Buffer, Range<u32>) -> B,
-    mut encode: impl FnMut(&mut wgpu::CommandEncoder, Clock<'_>, &B, Range<u32>),
-) -> Result<Drawn, Failure> {
-    let mut pixels = Vec::new();
-    let no_memory = |_| Failure::Other(format!("no memory for a picture of {width}x{height} pixels"));
-    pixels.try_reserve_exact(width as usize * height as usize).map_err(no_memory)?;
-    let rows = rows_per_band(gpu, width, height, tile);
-    let band = match kept.take().filter(|band| band.fits(width, rows)) {
-        Some(band) => band,
-        None => gpu.checked(|| Band::new(gpu, width, rows))?,
-    };
-    let mut seconds = Some(0.0);
-    for first_row in (0..height).step_by(rows as usize) {
-        let end_row = (first_row + rows).min(height);
-        let rows = first_row..end_row;
-        let bound = gpu.checked(|| bind(&band.pixels, rows.clone()))?;
-        let num_pixels = width as usize * rows.len();
-        let run =
-            band.run(gpu, num_pixels, &mut pixels, |encoder, clock| encode(encoder, clock, &bound, rows))?;
-        seconds = seconds.zip(run).map(|(sum, run)| sum + run);
-    }
-    *kept = Some(band);
-    Ok(Drawn { image: Image { width, height, pixels }, device_seconds: seconds, ray_doubt: None })
+/// A picture under way.
+pub(crate) struct Picture {
+    /// Without meshes, which are in `surfaces`.
+    pub(crate) view: PictureView<'static>,
+    pub(crate) surfaces: PictureSurfaces,
+    pub(crate) tiles: Vec<PictureTile>,
+    shown: Shown,
 }
 
-impl Band {
-    fn new(gpu: &Gpu, width: u32, rows: u32) -> Self {
-        let bytes = u64::from(width) * u64::from(rows) * PIXEL_BYTES;
-        let buffer = |label, size, usage| {
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-            gpu.device.create_buffer(&descriptor)
-        };
-        let stamps = gpu.has(wgpu::Features::TIMESTAMP_QUERY).then(|| Stamps {
-            queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("volery timestamps"),
-                ty: wgpu::QueryType::Timestamp,
-                count: 2,
-            }),
-            resolved: buffer(
-                "volery timestamps",
-                STAMP_BYTES,
-                wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-            ),
-        });
-        Self {
-            pixels: buffer(
-                "volery picture",
-                bytes,
-                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-            ),
-            // Timestamps lie behind the pixels, at a multiple of their 8 bytes: rows come in tiles of 8.
-            staging: buffer(
-                "volery picture staging",
-                bytes + STAMP_BYTES,
-                wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            ),
-            stamps,
-            bytes,
-        }
+/// What the parts so far were.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shown {
+    num_parts: u32,
+    /// Whether a part went to the device, so that the tiles hold something.
+    has_light: bool,
+    has_rays: bool,
+    /// What the parts can show; any colour if one of them says nothing.
+    colors: Option<Colors>,
+}
+
+/// What a part tells of itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PartKind {
+    is_rays: bool,
+    /// Of sheets: see [`Sheets::emitted`].
+    colors: Option<Colors>,
+}
+
+impl PartKind {
+    pub(crate) const RAYS: Self = Self { is_rays: true, colors: None };
+
+    pub(crate) fn sheets(content: &Sheets<'_>) -> Self {
+        Self { is_rays: false, colors: Some(content.emitted()) }
+    }
+}
+
+impl Kept {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self, Failure> {
+        let limits = gpu.device.limits();
+        let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+        let fits = |most: &u32| u64::from(*most) * u64::from(*most) * GATHERED_BYTES <= bytes;
+        let most = [TILE, TILE / 2, TILE / 4].into_iter().find(fits).unwrap_or(TILE / 8);
+        let tiles = gpu.checked(|| {
+            let tile = |tile: Tile| PictureTile {
+                tile,
+                gathered: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("volery tile, gathered"),
+                    size: tile.num_pixels() * GATHERED_BYTES,
+                    usage: wgpu::BufferUsages::STORAGE,
+                    mapped_at_creation: false,
+                }),
+            };
+            Tile::of_picture(size, most).map(tile).collect()
+        })?;
+        Ok(Self { size, tiles })
     }
 
-    /// Whether pictures of this width can be drawn in bands of these rows.
-    fn fits(&self, width: u32, rows: u32) -> bool {
-        self.bytes == u64::from(width) * u64::from(rows) * PIXEL_BYTES
+    pub(crate) fn fits(&self, view: &PictureView<'_>) -> bool {
+        self.size == [view.width, view.height]
     }
 
-    /// Runs passes that fill [`Band::pixels`], appends the pixels of `num_pixels` to `picture`, and
-    /// returns the device's own seconds.
-    fn run(
-        &self,
+    pub(crate) fn tiles(&self) -> &[PictureTile] {
+        &self.tiles
+    }
+}
+
+impl Picture {
+    pub(crate) fn new(view: &PictureView<'_>, kept: Kept, surfaces: PictureSurfaces) -> Self {
+        let view = PictureView { meshes: &[], ..*view };
+        Self { view, surfaces, tiles: kept.tiles, shown: Shown::default() }
+    }
+
+    /// Whether nothing was gathered yet.
+    pub(crate) fn is_first(&self) -> bool {
+        !self.shown.has_light
+    }
+
+    /// Counts a part that has nothing to show.
+    pub(crate) fn add_nothing(&mut self, jobs: &mut Jobs, kind: PartKind) -> u32 {
+        jobs.begin(Some(self.shown.num_parts));
+        self.shown.add(kind)
+    }
+
+    /// Adds a part: `encode` adds the passes of a tile, the first and the last of which must look at the clock.
+    pub(crate) fn add(
+        &mut self,
         gpu: &Gpu,
-        num_pixels: usize,
-        picture: &mut Vec<[f32; 3]>,
-        encode: impl FnOnce(&mut wgpu::CommandEncoder, Clock<'_>),
-    ) -> Result<Option<f64>, Failure> {
-        let received = gpu.checked(|| {
-            self.submit(gpu, encode);
-            let (sender, receiver) = mpsc::channel();
-            self.staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
-            gpu.wait().map(|()| receiver)
+        jobs: &mut Jobs,
+        kind: PartKind,
+        mut encode: impl FnMut(&mut wgpu::CommandEncoder, Clock<'_>, &Slip, (&Self, usize)),
+    ) -> Result<u32, Failure> {
+        jobs.begin(Some(self.shown.num_parts));
+        gpu.checked(|| {
+            for place in 0..self.tiles.len() {
+                jobs.submit(gpu, |encoder, clock, slip| encode(encoder, clock, slip, (self, place)));
+            }
+        })?;
+        self.shown.has_light = true;
+        Ok(self.shown.add(kind))
+    }
+
+    /// What ends a tile, as the shaders have it.
+    pub(crate) fn ended(&self, tile: Tile, origin: [u32; 2]) -> finish::Tile {
+        let [low, high] = self.shown.colors.unwrap_or(ANY_COLOR);
+        finish::Tile {
+            size: tile.size,
+            origin,
+            low,
+            has_light: self.shown.has_light.into(),
+            high,
+            has_surfaces: (!self.surfaces.is_empty()).into(),
+            background: self.view.background,
+            ..bytemuck::Zeroable::zeroed()
+        }
+    }
+
+    /// Whether nothing shows but the background.
+    pub(crate) fn is_bare(&self) -> bool {
+        !self.shown.has_light && self.surfaces.is_empty()
+    }
+
+    pub(crate) fn into_kept(self) -> Kept {
+        Kept { size: [self.view.width, self.view.height], tiles: self.tiles }
+    }
+}
+
+impl Shown {
+    /// Counts a part and returns its number.
+    fn add(&mut self, kind: PartKind) -> u32 {
+        let colors = kind.colors.unwrap_or(ANY_COLOR);
+        let join = |i: usize, of: fn(f32, f32) -> f32| {
+            let before = self.colors.map_or(colors[i], |before| before[i]);
+            [0, 1, 2].map(|channel| of(before[channel], colors[i][channel]))
+        };
+        self.colors = Some([join(0, f32::min), join(1, f32::max)]);
+        self.has_rays |= kind.is_rays;
+        self.num_parts += 1;
+        self.num_parts - 1
+    }
+}
+
+/// What ends pictures that are read back.
+pub(crate) struct Finish {
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::ComputePipeline,
+    /// For a tile's pixels, and where they are read.
+    buffers: Option<[wgpu::Buffer; 2]>,
+}
+
+impl Finish {
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Failure> {
+        gpu.checked(|| {
+            let layout = bind_group_layout(&gpu.device, "volery finish", finish::BINDINGS);
+            let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("volery finish"),
+                layout: Some(&pipeline_layout(gpu, &layout)),
+                module: &shader_module(gpu, finish::LABEL, finish::SOURCE),
+                entry_point: Some(finish::MAIN),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            });
+            Self { layout, pipeline, buffers: None }
+        })
+    }
+
+    /// Ends a picture and reads it.
+    pub(crate) fn read(&mut self, gpu: &Gpu, jobs: &mut Jobs, picture: &Picture) -> Result<Drawn, Failure> {
+        let (width, height) = (picture.view.width, picture.view.height);
+        let mut pixels: Vec<[f32; 3]> = Vec::new();
+        let no_memory = |_| Failure::Other(format!("no memory for a picture of {width}x{height} pixels"));
+        let num_pixels = width as usize * height as usize;
+        pixels.try_reserve_exact(num_pixels).map_err(no_memory)?;
+        if picture.is_bare() {
+            pixels.resize(num_pixels, picture.view.background);
+        } else {
+            jobs.begin(None);
+            for place in 0..picture.tiles.len() {
+                self.read_tile(gpu, jobs, (picture, place), &mut pixels)?;
+            }
+        }
+        gpu.checked(|| gpu.wait())??;
+        jobs.look(gpu)?;
+        let totals = jobs.totals();
+        Ok(Drawn {
+            image: Image { width, height, pixels },
+            device_seconds: totals.device_seconds,
+            ray_doubt: picture.shown.has_rays.then_some(totals.doubt),
+        })
+    }
+
+    fn read_tile(
+        &mut self,
+        gpu: &Gpu,
+        jobs: &mut Jobs,
+        (picture, place): (&Picture, usize),
+        pixels: &mut Vec<[f32; 3]>,
+    ) -> Result<(), Failure> {
+        let PictureTile { tile, gathered } = &picture.tiles[place];
+        let bytes = tile.num_pixels() * PIXEL_BYTES;
+        let kept = self.buffers.take().filter(|[pixels, _]| pixels.size() >= bytes);
+        let [shown, staging] = match kept {
+            Some(buffers) => buffers,
+            None => gpu.checked(|| {
+                let (shown, read) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::MAP_READ);
+                [shown | wgpu::BufferUsages::COPY_SRC, read | wgpu::BufferUsages::COPY_DST].map(|usage| {
+                    let label = Some("volery picture");
+                    let descriptor =
+                        wgpu::BufferDescriptor { label, size: bytes, usage, mapped_at_creation: false };
+                    gpu.device.create_buffer(&descriptor)
+                })
+            })?,
+        };
+        let (sender, receiver) = std::sync::mpsc::channel();
+        gpu.checked(|| {
+            let ended = [picture.ended(*tile, [0, 0])];
+            let ended = buffer(gpu, Upload::Views, "volery finish tile", &ended, wgpu::BufferUsages::UNIFORM);
+            let bound = bind_group(gpu, &self.layout, finish::BINDINGS, |name| match name {
+                "tile" => ended.as_entire_binding(),
+                "gathered" => gathered.as_entire_binding(),
+                "surfaces" => wgpu::BindingResource::TextureView(picture.surfaces.of_tile(place)),
+                // A binding that the shader gains and this does not know fails as one of the wrong kind.
+                _ => shown.as_entire_binding(),
+            });
+            jobs.submit(gpu, |encoder, clock, _| {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some("volery finish"),
+                    timestamp_writes: clock.compute(true, true),
+                });
+                pass.set_pipeline(&self.pipeline);
+                pass.set_bind_group(0, &bound, &[]);
+                let [x, y] = tile.size.map(|pixels| pixels.div_ceil(finish::GROUP));
+                pass.dispatch_workgroups(x, y, 1);
+                drop(pass);
+                encoder.copy_buffer_to_buffer(&shown, 0, &staging, 0, bytes);
+            });
+            staging.map_async(wgpu::MapMode::Read, ..bytes, move |result| drop(sender.send(result)));
+            gpu.wait()
         })??;
-        match received.recv() {
+        match receiver.recv() {
             Ok(Ok(())) => {}
             _ => return Err(Failure::Other("the picture could not be read back".to_owned())),
         }
-        let view = self.staging.get_mapped_range(..).map_err(|e| Failure::Other(e.to_string()))?;
-        let (pixels, stamps) = view.split_at(self.bytes as usize);
-        picture.extend_from_slice(&bytemuck::cast_slice(pixels)[..num_pixels]);
-        let seconds = self.stamps.is_some().then(|| {
-            let [from, to] = [0, 8].map(|i| u64::from_le_bytes(std::array::from_fn(|byte| stamps[i + byte])));
-            to.saturating_sub(from) as f64 * f64::from(gpu.queue.get_timestamp_period()) * 1e-9
-        });
+        let view = staging.get_mapped_range(..bytes).map_err(|e| Failure::Other(e.to_string()))?;
+        place_tile(pixels, picture.view.width as usize, *tile, bytemuck::cast_slice(&view));
         drop(view);
-        self.staging.unmap();
-        Ok(seconds)
+        staging.unmap();
+        self.buffers = Some([shown, staging]);
+        Ok(())
     }
+}
 
-    fn submit(&self, gpu: &Gpu, encode: impl FnOnce(&mut wgpu::CommandEncoder, Clock<'_>)) {
-        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("volery picture") };
-        let mut encoder = gpu.device.create_command_encoder(&descriptor);
-        encode(&mut encoder, Clock(self.stamps.as_ref().map(|stamps| &stamps.queries)));
-        encoder.copy_buffer_to_buffer(&self.pixels, 0, &self.staging, 0, self.bytes);
-        if let Some(stamps) = &self.stamps {
-            encoder.resolve_query_set(&stamps.queries, 0..2, &stamps.resolved, 0);
-            encoder.copy_buffer_to_buffer(&stamps.resolved, 0, &self.staging, self.bytes, STAMP_BYTES);
-        }
-        gpu.queue.submit([encoder.finish()]);
+/// Puts a tile's pixels in their place; tiles come row by row, so that what is before it is there.
+fn place_tile(pixels: &mut Vec<[f32; 3]>, width: usize, tile: Tile, read: &[[f32; 3]]) {
+    let [first_column, first_row] = tile.first.map(|pixel| pixel as usize);
+    let [columns, rows] = tile.size.map(|pixels| pixels as usize);
+    if columns == width {
+        pixels.extend_from_slice(read);
+        return;
+    }
+    pixels.resize(pixels.len().max((first_row + rows) * width), [0.0; 3]);
+    for (row, read) in read.chunks_exact(columns).enumerate() {
+        let start = (first_row + row) * width + first_column;
+        pixels[start..start + columns].copy_from_slice(read);
     }
 }

@@ -1,19 +1,17 @@
 //! The pipeline that shows cutting planes: its buffers from the frame, its commands.
 
-use std::ops::Range;
+use std::collections::{HashMap, HashSet};
 
 use volery_frame::planes::{OUTLINE_PIXELS, outline_color};
-use volery_frame::{
-    BlendedBrick, BrickGrid, Drawn, Frame, PlaneTile, PlaneTiles, Planes, PointTransfer, Sampling, TexelType,
-};
+use volery_frame::{BlendedBrick, BrickGrid, PlaneTile, PlaneTiles, Planes, Revision, Sampling, TexelType};
 use volery_shaders::{Binding, plane};
-use wgpu::util::DeviceExt as _;
 
-use crate::bindings::bind_group_layout;
-use crate::gpu::{Failure, Gpu};
-use crate::picture::{Band, band_size, draw_in_bands};
+use crate::bindings::{self, bind_group_layout};
+use crate::choice::{Choice, beside};
+use crate::gpu::{Failure, Gpu, Upload};
+use crate::jobs::Jobs;
+use crate::picture::{PartKind, Picture, Tile};
 use crate::pool::Pool;
-use crate::surfaces::Surfaces;
 
 // What the shader and the rest of the crates must mean alike.
 const _: () = assert!(plane::TILE == volery_frame::plane_tiles::TILE);
@@ -23,21 +21,38 @@ const _: () = assert!(plane::BLANK == volery_shaders::raycast::BLANK);
 pub(crate) struct Plane {
     layout: wgpu::BindGroupLayout,
     module: wgpu::ShaderModule,
-    /// For texels that are values, and for colours; each without and with surfaces. Compiled when first needed.
-    pipelines: [[Option<wgpu::ComputePipeline>; 2]; 2],
+    /// Compiled when first needed.
+    pipelines: HashMap<Form, wgpu::ComputePipeline>,
     frame: wgpu::Buffer,
     prepared: Option<Prepared>,
+    points: Option<Points>,
 }
 
-/// What was made for the bricks and the transfer function of the last frame.
+/// What a part asks of the pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Form {
+    /// Texels are colours.
+    has_colors: bool,
+    /// The grid holds bricks that are not of this part.
+    has_others: bool,
+    has_surfaces: bool,
+}
+
+/// What was made for bricks that were placed.
 struct Prepared {
     generation: u64,
-    placed: Vec<BlendedBrick>,
-    transfer: PointTransfer,
+    /// Each brick's number in the grid.
+    numbers: HashMap<BlendedBrick, u32>,
+    choice: Choice,
     grid: BrickGrid,
     bricks: wgpu::Buffer,
     entries: wgpu::Buffer,
-    points: wgpu::Buffer,
+}
+
+/// A transfer function on the device.
+struct Points {
+    revision: Revision,
+    buffer: wgpu::Buffer,
 }
 
 impl Plane {
@@ -48,7 +63,7 @@ impl Plane {
                 label: Some(plane::LABEL),
                 source: wgpu::ShaderSource::Wgsl(plane::SOURCE.into()),
             }),
-            pipelines: [[None, None], [None, None]],
+            pipelines: HashMap::new(),
             frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("volery plane frame"),
                 size: size_of::<plane::Frame>() as u64,
@@ -56,6 +71,7 @@ impl Plane {
                 mapped_at_creation: false,
             }),
             prepared: None,
+            points: None,
         })
     }
 
@@ -64,61 +80,64 @@ impl Plane {
         self.prepared = None;
     }
 
-    /// Draws a checked frame with planes and bricks, all of which are resident.
-    pub(crate) fn draw(
+    /// Adds a checked part with planes and bricks, all of which are resident, to a picture.
+    pub(crate) fn add(
         &mut self,
         gpu: &Gpu,
         pool: &Pool,
-        (band, surfaces): (&mut Option<Band>, &mut Surfaces),
-        frame: &Frame<'_>,
+        (picture, jobs): (&mut Picture, &mut Jobs),
         content: &Planes<'_>,
-    ) -> Result<Drawn, Failure> {
-        let size = [frame.width, frame.height];
-        let surfaces = surfaces.of_frame(gpu, frame, band_size(gpu, size, plane::TILE))?;
-        let prepared = match self.prepared.take().filter(|prepared| prepared.is_of(pool, content)) {
-            Some(prepared) => prepared,
-            None => gpu.checked(|| Prepared::new(gpu, pool, content))?,
+    ) -> Result<u32, Failure> {
+        let mut prepared = Prepared::serving(self.prepared.take(), gpu, pool, content)?;
+        let revision = content.transfer.revision();
+        let points = match self.points.take().filter(|points| points.revision == revision) {
+            Some(points) => points,
+            None => gpu.checked(|| {
+                let points = content.transfer.points();
+                let buffer = buffer(gpu, Upload::Transfers, "volery plane points", points);
+                Points { revision, buffer }
+            })?,
         };
-        let pipeline = self.pipeline(gpu, [pool.layout().texel == TexelType::Rgba8, !surfaces.is_empty()])?;
-        let mut shader_frame = shader_frame(frame, content, pool, &prepared.grid);
-        let view = PlaneTiles::new(frame, content.planes, pool.layout());
+        let form = Form {
+            has_colors: pool.layout().texel == TexelType::Rgba8,
+            has_others: prepared.choose(gpu, content),
+            has_surfaces: !picture.surfaces.is_empty(),
+        };
+        let pipeline = self.pipeline(gpu, form)?;
+        let view = PlaneTiles::new(&picture.view, content.planes, pool.layout());
         let depths_per_length = pool.layout().spacing.max_element().recip();
-        shader_frame.depths_per_length = depths_per_length.min(f64::from(f32::MAX)) as f32;
-        let shader_tile = |tile: PlaneTile| {
-            let offset = (surfaces.zero_depth() - tile.zero_depth) * depths_per_length;
-            plane::PlaneTile { surface_offset: offset as f32, ..shader_tile(tile) }
-        };
-        let bind = |picture: &wgpu::Buffer, rows: Range<u32>| {
-            let columns = (0..frame.width).step_by(plane::TILE as usize);
-            let tiles: Vec<_> = rows
-                .step_by(plane::TILE as usize)
-                .flat_map(|row| columns.clone().map(move |column| (column, row)))
-                .flat_map(|(column, row)| view.tile(column, row))
-                .map(|tile| tile.map_or_else(bytemuck::Zeroable::zeroed, shader_tile))
-                .collect();
-            let tiles = buffer(gpu, "volery plane tiles", &tiles);
-            self.bind(gpu, pool, &prepared, &tiles, (picture, surfaces.view()))
-        };
-        let passes = (plane::TILE, &surfaces);
-        let drawn = draw_in_bands(gpu, band, size, passes, bind, |pass, bound, rows| {
-            (shader_frame.first_row, shader_frame.end_row) = (rows.start, rows.end);
-            gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&shader_frame));
+        let number = picture.add(gpu, jobs, PartKind::default(), |encoder, clock, _, (picture, place)| {
+            let tile = picture.tiles[place].tile;
+            let frame = shader_frame(picture, tile, content, (pool, &prepared.grid));
+            gpu.count(Upload::Views, size_of_val(&frame));
+            gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+            let tiles = buffer(
+                gpu,
+                Upload::Views,
+                "volery plane tiles",
+                &shader_tiles(picture, tile, &view, depths_per_length),
+            );
+            let bound = self.bind(gpu, pool, (&prepared, &points), &tiles, (picture, place));
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("volery planes"),
+                timestamp_writes: clock.compute(true, true),
+            });
             pass.set_pipeline(&pipeline);
-            pass.set_bind_group(0, bound, &[]);
-            let groups = [frame.width, rows.end - rows.start].map(|n| n.div_ceil(plane::TILE));
-            pass.dispatch_workgroups(groups[0], groups[1], 1);
+            pass.set_bind_group(0, &bound, &[]);
+            let [x, y] = tile.size.map(|n| n.div_ceil(plane::TILE));
+            pass.dispatch_workgroups(x, y, 1);
         });
-        self.prepared = Some(prepared);
-        drawn
+        (self.prepared, self.points) = (Some(prepared), Some(points));
+        number
     }
 
     fn bind(
         &self,
         gpu: &Gpu,
         pool: &Pool,
-        prepared: &Prepared,
+        (prepared, points): (&Prepared, &Points),
         tiles: &wgpu::Buffer,
-        (picture, surfaces): (&wgpu::Buffer, &wgpu::TextureView),
+        (picture, place): (&Picture, usize),
     ) -> wgpu::BindGroup {
         let descriptor = wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -131,11 +150,12 @@ impl Plane {
                 "atlas" => wgpu::BindingResource::TextureView(atlas.as_ref()?),
                 "tiles" => tiles.as_entire_binding(),
                 "bricks" => prepared.bricks.as_entire_binding(),
+                "chosen" => prepared.choice.buffer.as_entire_binding(),
                 "entries" => prepared.entries.as_entire_binding(),
-                "points" => prepared.points.as_entire_binding(),
-                "surfaces" => wgpu::BindingResource::TextureView(surfaces),
+                "points" => points.buffer.as_entire_binding(),
+                "surfaces" => wgpu::BindingResource::TextureView(picture.surfaces.of_tile(place)),
                 // A binding that the shader gains and this does not know fails as one of the wrong kind.
-                _ => picture.as_entire_binding(),
+                _ => picture.tiles[place].gathered.as_entire_binding(),
             })
         };
         let entries: Vec<_> = plane::BINDINGS
@@ -151,16 +171,12 @@ impl Plane {
         })
     }
 
-    /// The pipeline for one kind of texels, and for surfaces or none, compiled if this is the first frame that needs it.
-    fn pipeline(
-        &mut self,
-        gpu: &Gpu,
-        [has_colors, has_surfaces]: [bool; 2],
-    ) -> Result<wgpu::ComputePipeline, Failure> {
-        let made = &mut self.pipelines[usize::from(has_colors)][usize::from(has_surfaces)];
-        if let Some(pipeline) = made {
+    /// The pipeline of one form, compiled if this is the first part that needs it.
+    fn pipeline(&mut self, gpu: &Gpu, form: Form) -> Result<wgpu::ComputePipeline, Failure> {
+        if let Some(pipeline) = self.pipelines.get(&form) {
             return Ok(pipeline.clone());
         }
+        let Form { has_colors, has_others, has_surfaces } = form;
         let pipeline = gpu.checked(|| {
             let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some("volery plane"),
@@ -168,13 +184,14 @@ impl Plane {
                 immediate_size: 0,
             });
             gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(if has_colors { "volery plane, colours" } else { "volery plane" }),
+                label: Some(&format!("volery plane {form:?}")),
                 layout: Some(&layout),
                 module: &self.module,
                 entry_point: Some(plane::MAIN),
                 compilation_options: wgpu::PipelineCompilationOptions {
                     constants: &[
                         (plane::HAS_COLORS, f64::from(has_colors)),
+                        (plane::HAS_OTHERS, f64::from(has_others)),
                         (plane::HAS_SURFACES, f64::from(has_surfaces)),
                     ],
                     ..Default::default()
@@ -182,51 +199,74 @@ impl Plane {
                 cache: None,
             })
         })?;
-        Ok(made.insert(pipeline).clone())
+        Ok(self.pipelines.entry(form).or_insert(pipeline).clone())
     }
 }
 
 impl Prepared {
-    fn new(gpu: &Gpu, pool: &Pool, content: &Planes<'_>) -> Self {
-        let grid = BrickGrid::new(pool.layout(), content.bricks);
-        let bricks: Vec<_> = grid.bricks().iter().map(|brick| shader_brick(pool, brick)).collect();
+    /// What serves a part, all of whose bricks are resident: what there is, or new.
+    fn serving(kept: Option<Self>, gpu: &Gpu, pool: &Pool, content: &Planes<'_>) -> Result<Self, Failure> {
+        let mut bricks = content.bricks.to_vec();
+        if let Some(kept) = kept {
+            let is_held = |brick: &BlendedBrick| kept.numbers.contains_key(brick);
+            if kept.generation == pool.generation() && content.bricks.iter().all(is_held) {
+                return Ok(kept);
+            }
+            let old = kept.grid.bricks();
+            let placed = |brick: &'_ BlendedBrick| brick.placed;
+            let (before, now): (Vec<_>, Vec<_>) =
+                (old.iter().map(placed).collect(), content.bricks.iter().map(placed).collect());
+            let others = beside(before.iter(), now.iter(), pool);
+            bricks.extend(old.iter().filter(|brick| others.contains(&brick.placed)));
+        }
+        gpu.checked(|| Self::new(gpu, pool, &bricks))
+    }
+
+    fn new(gpu: &Gpu, pool: &Pool, bricks: &[BlendedBrick]) -> Self {
+        let grid = BrickGrid::new(pool.layout(), bricks);
+        let shader_bricks: Vec<_> = grid.bricks().iter().map(|brick| shader_brick(pool, brick)).collect();
         Self {
             generation: pool.generation(),
-            placed: content.bricks.to_vec(),
-            transfer: content.transfer.clone(),
-            bricks: buffer(gpu, "volery plane bricks", &bricks),
-            entries: buffer(gpu, "volery plane entries", grid.entries()),
-            points: buffer(gpu, "volery plane points", content.transfer.points()),
+            numbers: grid.bricks().iter().copied().zip(0..).collect(),
+            choice: Choice::of(gpu, bricks.len()),
+            bricks: buffer(gpu, Upload::Places, "volery plane bricks", &shader_bricks),
+            entries: buffer(gpu, Upload::Places, "volery plane entries", grid.entries()),
             grid,
         }
     }
 
-    fn is_of(&self, pool: &Pool, content: &Planes<'_>) -> bool {
-        let Self { generation, placed, transfer, grid: _, bricks: _, entries: _, points: _ } = self;
-        *generation == pool.generation() && *placed == content.bricks && transfer == content.transfer
+    /// Tells the device which bricks are of a part, for the commands that come next; whether there are others.
+    fn choose(&mut self, gpu: &Gpu, content: &Planes<'_>) -> bool {
+        let chosen: HashSet<u32> =
+            content.bricks.iter().filter_map(|brick| self.numbers.get(brick).copied()).collect();
+        let has_others = chosen.len() < self.grid.bricks().len();
+        if has_others {
+            self.choice.send(gpu, chosen.into_iter());
+        }
+        has_others
     }
 }
 
 /// A storage buffer that the shader reads.
-fn buffer<T: bytemuck::NoUninit>(gpu: &Gpu, label: &str, contents: &[T]) -> wgpu::Buffer {
-    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some(label),
-        contents: bytemuck::cast_slice(contents),
-        usage: wgpu::BufferUsages::STORAGE,
-    })
+fn buffer<T: bytemuck::NoUninit>(gpu: &Gpu, kind: Upload, label: &str, contents: &[T]) -> wgpu::Buffer {
+    bindings::buffer(gpu, kind, label, contents, wgpu::BufferUsages::STORAGE)
 }
 
-/// The shader's frame; the band of rows is still open.
-fn shader_frame(frame: &Frame<'_>, content: &Planes<'_>, pool: &Pool, grid: &BrickGrid) -> plane::Frame {
+/// The shader's frame for a tile.
+fn shader_frame(
+    picture: &Picture,
+    tile: Tile,
+    content: &Planes<'_>,
+    (pool, grid): (&Pool, &BrickGrid),
+) -> plane::Frame {
     let layout = pool.layout();
     let is_scaled = layout.texel != TexelType::Rgba8 && pool.texels_per_unit() != 1.0;
     plane::Frame {
         cells: layout.cells.map(|n| n as f32),
-        width: frame.width,
-        background: frame.background,
-        end_row: 0,
+        width: tile.size[0],
+        height: tile.size[1],
+        is_first: picture.is_first().into(),
         grid_dims: grid.dims(),
-        first_row: 0,
         brick_cells: layout.brick_cells as f32,
         bricks_per_cell: 1.0 / layout.brick_cells as f32,
         entries_per_cell: 1.0 / grid.entry_cells() as f32,
@@ -239,8 +279,30 @@ fn shader_frame(frame: &Frame<'_>, content: &Planes<'_>, pool: &Pool, grid: &Bri
         is_nearest: (content.sampling == Sampling::Nearest).into(),
         is_transparent: content.is_transparent.into(),
         shows_bricks: content.shows_bricks.into(),
+        depths_per_length: layout.spacing.max_element().recip().min(f64::from(f32::MAX)) as f32,
         ..bytemuck::Zeroable::zeroed()
     }
+}
+
+/// How each tile of planes in a tile of the picture sees each plane.
+fn shader_tiles(
+    picture: &Picture,
+    tile: Tile,
+    view: &PlaneTiles,
+    depths_per_length: f64,
+) -> Vec<plane::PlaneTile> {
+    let zero_depth = picture.surfaces.zero_depth();
+    let shader_tile = |tile: PlaneTile| {
+        let offset = (zero_depth - tile.zero_depth) * depths_per_length;
+        plane::PlaneTile { surface_offset: offset as f32, ..shader_tile(tile) }
+    };
+    let along =
+        |axis: usize| (tile.first[axis]..tile.first[axis] + tile.size[axis]).step_by(plane::TILE as usize);
+    along(1)
+        .flat_map(|row| along(0).map(move |column| (column, row)))
+        .flat_map(|(column, row)| view.tile(column, row))
+        .map(|tile| tile.map_or_else(bytemuck::Zeroable::zeroed, shader_tile))
+        .collect()
 }
 
 fn shader_tile(tile: PlaneTile) -> plane::PlaneTile {

@@ -13,7 +13,7 @@ use volery_frame::{Brick, BrickId, TexelType, Texels, UploadError, VolumeLayout}
 use volery_shaders::raycast::{BLANK, CELLS_MASK, SLOT_MASK};
 
 use crate::blocks::Summary;
-use crate::gpu::{Failure, Gpu};
+use crate::gpu::{Failure, Gpu, Upload};
 use crate::units::Resident;
 
 /// Bytes handed to the device before it is asked to take them: bounds the memory of copies under way.
@@ -27,6 +27,8 @@ pub(crate) struct Pool {
     atlas: Option<Atlas>,
     resident: HashMap<BrickId, Resident>,
     num_slots_used: u32,
+    /// Of those used, which hold nothing any more.
+    free_slots: Vec<u32>,
     /// Grows with every change of what is resident, so that what was made of it can be told old.
     generation: u64,
 }
@@ -89,7 +91,17 @@ impl Pool {
             TexelType::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
         };
         let resident = HashMap::new();
-        Ok(Self { layout: *layout, format, slot, atlas: None, resident, num_slots_used: 0, generation: 0 })
+        let (atlas, free_slots) = (None, Vec::new());
+        Ok(Self {
+            layout: *layout,
+            format,
+            slot,
+            atlas,
+            resident,
+            num_slots_used: 0,
+            free_slots,
+            generation: 0,
+        })
     }
 
     pub(crate) fn layout(&self) -> &VolumeLayout {
@@ -112,6 +124,11 @@ impl Pool {
         self.slot
     }
 
+    /// Slots that were ever used.
+    pub(crate) fn num_slots(&self) -> u32 {
+        self.num_slots_used
+    }
+
     pub(crate) fn slots_per_layer(&self) -> u32 {
         self.atlas.as_ref().map_or(1, |atlas| atlas.slots_per_layer)
     }
@@ -131,7 +148,7 @@ impl Pool {
     }
 
     pub(crate) fn resident_bytes(&self) -> u64 {
-        let Self { layout: _, format: _, slot: _, atlas, resident, num_slots_used: _, generation: _ } = self;
+        let Self { layout: _, format: _, slot: _, atlas, resident, .. } = self;
         let texels = atlas.as_ref().map_or(0, |atlas| {
             u64::from(atlas.texture.width())
                 * u64::from(atlas.texture.height())
@@ -153,16 +170,14 @@ impl Pool {
     pub(crate) fn upload(&mut self, gpu: &Gpu, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
         bricks.iter().try_for_each(|brick| check(brick, &self.layout))?;
         let mut slots = HashMap::new();
-        let mut num_slots = self.num_slots_used;
+        let (mut num_slots, mut free) = (self.num_slots_used, self.free_slots.clone());
         for brick in bricks {
             slots.entry(brick.id).or_insert_with(|| {
-                self.resident.get(&brick.id).map_or_else(
-                    || {
-                        num_slots += 1;
-                        num_slots - 1
-                    },
-                    |resident| resident.slot,
-                )
+                let held = self.resident.get(&brick.id).map(|resident| resident.slot);
+                held.or_else(|| free.pop()).unwrap_or_else(|| {
+                    num_slots += 1;
+                    num_slots - 1
+                })
             });
         }
         self.reserve(gpu, num_slots)?;
@@ -181,17 +196,24 @@ impl Pool {
             gpu.queue.submit([]);
             Ok(())
         });
+        (self.num_slots_used, self.free_slots) = (num_slots, free);
         if let Err(failure) = written.and_then(|result| result) {
             // Nothing says how far it came: none of these bricks can be trusted.
             bricks.iter().for_each(|brick| drop(self.resident.remove(&brick.id)));
+            self.free_slots.extend(slots.into_values());
             return Err(UploadError::Device(failure.to_string()));
         }
-        self.num_slots_used = num_slots;
         for brick in bricks {
             let summary = Summary::of(brick, self.layout.brick_cells);
             self.resident.insert(brick.id, Resident { slot: slots[&brick.id], summary });
         }
         Ok(())
+    }
+
+    /// Forgets bricks; their slots are for others.
+    pub(crate) fn evict(&mut self, bricks: &[BrickId]) {
+        self.free_slots.extend(bricks.iter().filter_map(|id| self.resident.remove(id)).map(|held| held.slot));
+        self.generation += 1;
     }
 
     /// Makes room for so many slots.
@@ -265,6 +287,7 @@ impl Pool {
             Texels::Rgba8(texels) => self.slot.fold(samples, texels, |texel| texel),
         };
         let [width, height] = self.slot.size;
+        gpu.count(Upload::Bricks, bytes.len());
         gpu.queue.write_texture(
             atlas.place(index, self.slot),
             &bytes,

@@ -2,15 +2,17 @@
 
 use std::collections::HashMap;
 
-use volery_frame::{RayDoubt, RayTransfer, TexelType, VolumeLayout};
+use volery_frame::{RayTransfer, Rays, Revision, TexelType, VolumeLayout};
 use volery_shaders::{Binding, raycast};
 
 use crate::bindings::{bind_group_layout, buffer};
-use crate::gpu::{Failure, Gpu};
+use crate::gpu::{Failure, Gpu, Upload};
+use crate::jobs::Jobs;
+use crate::picture::{PartKind, Picture};
+use crate::placed::Placed;
+use crate::pool::Pool;
 use crate::units::Units;
-
-/// Bytes of two numbers.
-const WORST_BYTES: u64 = 8;
+use crate::view::shader_frame;
 
 /// The pipeline in its forms.
 pub(crate) struct Raycast {
@@ -20,8 +22,15 @@ pub(crate) struct Raycast {
     pipelines: HashMap<Form, wgpu::ComputePipeline>,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
-    /// The two numbers of a [`RayDoubt`], and where they are read.
-    worst: [wgpu::Buffer; 2],
+    table: Option<Table>,
+    placed: Option<Placed>,
+}
+
+/// A transfer function on the device.
+struct Table {
+    revision: Revision,
+    entries: wgpu::Texture,
+    bands: wgpu::Buffer,
 }
 
 /// What a frame asks of the pipeline: a form does not pay for what it need not do.
@@ -33,41 +42,24 @@ pub(crate) struct Form {
     pub(crate) is_whole: bool,
     /// There are cells for which the table is too coarse.
     pub(crate) has_exact: bool,
+    /// Units hold bricks that are not of this part.
+    pub(crate) has_others: bool,
     /// Rays end at surfaces.
     pub(crate) has_surfaces: bool,
 }
 
 impl Form {
-    pub(crate) fn new(layout: &VolumeLayout, units: &Units, has_blanks: bool) -> Self {
+    /// Of texels that may be blank or not, in bricks of a layout; without the rest.
+    pub(crate) fn new(layout: &VolumeLayout, has_blanks: bool) -> Self {
         let is_whole = matches!(layout.texel, TexelType::U8 | TexelType::U16);
-        let is_marked =
-            |words: &[u32; 2]| words[0] & raycast::OCCUPIED != 0 && words[1] & raycast::EXACT != 0;
-        Self { has_blanks, is_whole, has_exact: units.words.iter().any(is_marked), has_surfaces: false }
+        Self { has_blanks, is_whole, has_exact: false, has_others: false, has_surfaces: false }
     }
-}
-
-/// What one frame binds.
-pub(crate) struct Resources<'a> {
-    pub(crate) units: &'a wgpu::Texture,
-    pub(crate) atlas: &'a wgpu::Texture,
-    pub(crate) transfer: &'a wgpu::Texture,
-    pub(crate) bands: &'a wgpu::Buffer,
-    pub(crate) picture: &'a wgpu::Buffer,
-    pub(crate) surfaces: &'a wgpu::TextureView,
 }
 
 impl Raycast {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Failure> {
         gpu.checked(|| {
             let device = &gpu.device;
-            let empty = |label, size, usage| {
-                device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some(label),
-                    size,
-                    usage: usage | wgpu::BufferUsages::COPY_DST,
-                    mapped_at_creation: false,
-                })
-            };
             let layout = bind_group_layout(device, "volery raycast", raycast::BINDINGS);
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(raycast::LABEL),
@@ -75,44 +67,96 @@ impl Raycast {
             });
             Self {
                 pipelines: HashMap::new(),
-                frame: empty("volery frame", size_of::<raycast::Frame>() as u64, wgpu::BufferUsages::UNIFORM),
-                worst: [
-                    empty(
-                        "volery doubt",
-                        WORST_BYTES,
-                        wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-                    ),
-                    empty("volery doubt staging", WORST_BYTES, wgpu::BufferUsages::MAP_READ),
-                ],
+                frame: device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("volery frame"),
+                    size: size_of::<raycast::Frame>() as u64,
+                    usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                    mapped_at_creation: false,
+                }),
                 sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                     label: Some("volery atlas"),
                     ..Default::default()
                 }),
                 module,
                 layout,
+                table: None,
+                placed: None,
             }
         })
     }
 
-    pub(crate) fn bind(&self, gpu: &Gpu, resources: &Resources<'_>) -> wgpu::BindGroup {
+    /// Lets go of what belongs to the volume that was.
+    pub(crate) fn forget(&mut self) {
+        self.placed = None;
+    }
+
+    /// Adds a checked part with bricks, all of which are resident, to a picture.
+    pub(crate) fn add(
+        &mut self,
+        gpu: &Gpu,
+        pool: &Pool,
+        (picture, jobs): (&mut Picture, &mut Jobs),
+        rays: &Rays<'_>,
+    ) -> Result<u32, Failure> {
+        let atlas = pool.texture().filter(|_| !pool.layout().cells.contains(&0));
+        let Some(atlas) = atlas else { return Ok(picture.add_nothing(jobs, PartKind::RAYS)) };
+        let revision = rays.transfer.revision();
+        let table = match self.table.take().filter(|table| table.revision == revision) {
+            Some(table) => table,
+            None => gpu.checked(|| {
+                let (entries, bands) =
+                    (transfer_texture(gpu, rays.transfer), bands_buffer(gpu, rays.transfer));
+                Table { revision, entries, bands }
+            })?,
+        };
+        let mut placed = Placed::serving(self.placed.take(), gpu, pool, rays)?;
+        let form = Form { has_surfaces: !picture.surfaces.is_empty(), ..placed.choose(gpu, pool, rays) };
+        let pipeline = self.pipeline(gpu, form)?;
+        let number = picture.add(gpu, jobs, PartKind::RAYS, |encoder, clock, slip, (picture, place)| {
+            let frame =
+                shader_frame(picture, picture.tiles[place].tile, rays.transfer, (pool, &placed.units));
+            gpu.count(Upload::Views, size_of_val(&frame));
+            gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+            let bound = self.bind(gpu, (&table, &placed, atlas), (picture, place), &slip.worst);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("volery rays"),
+                timestamp_writes: clock.compute(true, true),
+            });
+            pass.set_pipeline(&pipeline);
+            pass.set_bind_group(0, &bound, &[]);
+            let [x, y] = [frame.width, frame.height].map(|n| n.div_ceil(raycast::TILE));
+            pass.dispatch_workgroups(x, y, 1);
+        });
+        (self.table, self.placed) = (Some(table), Some(placed));
+        number
+    }
+
+    fn bind(
+        &self,
+        gpu: &Gpu,
+        (table, placed, atlas): (&Table, &Placed, &wgpu::Texture),
+        (picture, place): (&Picture, usize),
+        worst: &wgpu::Buffer,
+    ) -> wgpu::BindGroup {
         let view = |texture: &wgpu::Texture, dimension| {
             let descriptor = wgpu::TextureViewDescriptor { dimension: Some(dimension), ..Default::default() };
             texture.create_view(&descriptor)
         };
-        let units = view(resources.units, wgpu::TextureViewDimension::D3);
-        let atlas = view(resources.atlas, wgpu::TextureViewDimension::D2Array);
-        let transfer = view(resources.transfer, wgpu::TextureViewDimension::D2);
+        let units = view(&placed.texture, wgpu::TextureViewDimension::D3);
+        let atlas = view(atlas, wgpu::TextureViewDimension::D2Array);
+        let transfer = view(&table.entries, wgpu::TextureViewDimension::D2);
         let resource = |binding: &Binding| match binding.name {
             "frame" => self.frame.as_entire_binding(),
             "units" => wgpu::BindingResource::TextureView(&units),
+            "chosen" => placed.choice.buffer.as_entire_binding(),
             "atlas" => wgpu::BindingResource::TextureView(&atlas),
             "atlas_sampler" => wgpu::BindingResource::Sampler(&self.sampler),
             "transfer" => wgpu::BindingResource::TextureView(&transfer),
-            "worst" => self.worst[0].as_entire_binding(),
-            "bands" => resources.bands.as_entire_binding(),
-            "surfaces" => wgpu::BindingResource::TextureView(resources.surfaces),
+            "worst" => worst.as_entire_binding(),
+            "bands" => table.bands.as_entire_binding(),
+            "surfaces" => wgpu::BindingResource::TextureView(picture.surfaces.of_tile(place)),
             // A binding that the shader gains and this does not know fails as one of the wrong kind.
-            _ => resources.picture.as_entire_binding(),
+            _ => picture.tiles[place].gathered.as_entire_binding(),
         };
         let entries: Vec<_> = raycast::BINDINGS
             .iter()
@@ -125,56 +169,13 @@ impl Raycast {
         })
     }
 
-    /// Hands the frame to the device, for the commands that come next.
-    pub(crate) fn set_frame(&self, gpu: &Gpu, frame: &raycast::Frame) {
-        gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
-    }
-
-    /// Forgets the doubt of the picture before, for the commands that come next.
-    pub(crate) fn reset_doubt(&self, gpu: &Gpu) {
-        gpu.queue.write_buffer(&self.worst[0], 0, &[0; WORST_BYTES as usize]);
-    }
-
-    /// What the rays since [`Raycast::reset_doubt`] may be off by.
-    pub(crate) fn doubt(&self, gpu: &Gpu) -> Result<RayDoubt, Failure> {
-        let [worst, staging] = &self.worst;
-        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("volery doubt") };
-        gpu.checked(|| {
-            let mut encoder = gpu.device.create_command_encoder(&descriptor);
-            encoder.copy_buffer_to_buffer(worst, 0, staging, 0, WORST_BYTES);
-            gpu.queue.submit([encoder.finish()]);
-            staging.map_async(wgpu::MapMode::Read, .., |_| ());
-            gpu.wait()
-        })??;
-        let view = staging.get_mapped_range(..).map_err(|e| Failure::Other(e.to_string()))?;
-        let [cells, table_way] =
-            [0, 4].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
-        drop(view);
-        staging.unmap();
-        // Ways are depths to the base 2.
-        Ok(RayDoubt { cells, table_way: table_way * std::f32::consts::LN_2 })
-    }
-
     /// The pipeline of one form, compiled if this is the first frame that needs it.
-    pub(crate) fn pipeline(&mut self, gpu: &Gpu, form: Form) -> Result<wgpu::ComputePipeline, Failure> {
+    fn pipeline(&mut self, gpu: &Gpu, form: Form) -> Result<wgpu::ComputePipeline, Failure> {
         if let Some(pipeline) = self.pipelines.get(&form) {
             return Ok(pipeline.clone());
         }
         let pipeline = gpu.checked(|| pipeline(&gpu.device, &self.layout, &self.module, form))?;
         Ok(self.pipelines.entry(form).or_insert(pipeline).clone())
-    }
-
-    /// Casts the rays of `frame`'s band of rows.
-    pub(crate) fn encode(
-        pass: &mut wgpu::ComputePass<'_>,
-        pipeline: &wgpu::ComputePipeline,
-        bound: &wgpu::BindGroup,
-        frame: &raycast::Frame,
-    ) {
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, bound, &[]);
-        let rows = frame.end_row - frame.first_row;
-        pass.dispatch_workgroups(frame.width.div_ceil(raycast::TILE), rows.div_ceil(raycast::TILE), 1);
     }
 }
 
@@ -199,6 +200,7 @@ fn pipeline(
                 (raycast::HAS_BLANKS, f64::from(form.has_blanks)),
                 (raycast::IS_WHOLE, f64::from(form.is_whole)),
                 (raycast::HAS_EXACT, f64::from(form.has_exact)),
+                (raycast::HAS_OTHERS, f64::from(form.has_others)),
                 (raycast::HAS_SURFACES, f64::from(form.has_surfaces)),
             ],
             ..Default::default()
@@ -210,23 +212,40 @@ fn pipeline(
 /// The units as a texture.
 pub(crate) fn units_texture(gpu: &Gpu, units: &Units) -> wgpu::Texture {
     let bytes = bytemuck::cast_slice(&units.words);
-    texture(gpu, "volery units", wgpu::TextureDimension::D3, wgpu::TextureFormat::Rg32Uint, units.dims, bytes)
+    texture(
+        gpu,
+        Upload::Places,
+        "volery units",
+        wgpu::TextureDimension::D3,
+        wgpu::TextureFormat::Rg32Uint,
+        units.dims,
+        bytes,
+    )
 }
 
 /// The transfer function's antiderivatives as a texture.
 pub(crate) fn transfer_texture(gpu: &Gpu, transfer: &RayTransfer) -> wgpu::Texture {
     let bytes = bytemuck::cast_slice(transfer.entries());
     let dims = [transfer.entries().len() as u32, 1, 1];
-    texture(gpu, "volery transfer", wgpu::TextureDimension::D2, wgpu::TextureFormat::Rgba32Float, dims, bytes)
+    texture(
+        gpu,
+        Upload::Transfers,
+        "volery transfer",
+        wgpu::TextureDimension::D2,
+        wgpu::TextureFormat::Rgba32Float,
+        dims,
+        bytes,
+    )
 }
 
 /// The transfer function's bands as a buffer.
 pub(crate) fn bands_buffer(gpu: &Gpu, transfer: &RayTransfer) -> wgpu::Buffer {
-    buffer(gpu, "volery bands", transfer.bands(), wgpu::BufferUsages::STORAGE)
+    buffer(gpu, Upload::Transfers, "volery bands", transfer.bands(), wgpu::BufferUsages::STORAGE)
 }
 
 fn texture(
     gpu: &Gpu,
+    kind: Upload,
     label: &str,
     dimension: wgpu::TextureDimension,
     format: wgpu::TextureFormat,
@@ -244,6 +263,7 @@ fn texture(
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
+    gpu.count(kind, bytes.len());
     let bytes_per_row = width * format.block_copy_size(None).unwrap_or(1);
     gpu.queue.write_texture(
         texture.as_image_copy(),

@@ -5,7 +5,7 @@
 //! or 12 bytes. A sheet is an indexed draw, whose number tells its thickness; neighbours of equal thickness are one.
 //! The fragment stage knows the angle of its ray with the sheets, so how much matter it passes, looks colour and
 //! extinction up, and blends over what is behind. Blending does not clamp: an opacity below zero takes matter away.
-//! What is summed up is taken into the range of what can be emitted when the tile is copied.
+//! What is summed up is taken into the range of what can be emitted when the picture ends.
 //!
 //! # Precision
 //! Places reach the eye by rows that f64 made, so a far origin loses nothing. Tables are buffers, interpolated in 32
@@ -21,15 +21,15 @@ mod held;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use volery_frame::{Drawn, Frame, Quantization, Sheet, SheetVertices, Sheets};
+use volery_frame::{Counted, Quantization, Revision, Sheet, SheetVertices, Sheets};
 use volery_scene::Projection;
 use volery_shaders::sheets;
 
 use crate::bindings::{bind_group, bind_group_layout, buffer, shader_module};
-use crate::gpu::{Failure, Gpu};
-use crate::picture::Band;
-use crate::surfaces::FrameSurfaces;
-use crate::tiles::{Affine, Tile, TileView, Tiles, matter_pipeline};
+use crate::gpu::{Failure, Gpu, Upload};
+use crate::jobs::Jobs;
+use crate::picture::{PartKind, Picture, Tile};
+use crate::tiles::{Affine, TileView, Tiles, matter_pipeline};
 use held::{Held, Part, Store, uploaded};
 
 // What the shader and the frame must mean alike.
@@ -42,6 +42,7 @@ pub(crate) struct SheetStacks {
     /// Compiled when first needed.
     pipelines: HashMap<Form, wgpu::RenderPipeline>,
     store: Store,
+    tables: Option<Tables>,
 }
 
 /// What a frame asks of the pipeline: a form does not pay for what it need not do.
@@ -56,7 +57,7 @@ struct Form {
 }
 
 impl Form {
-    fn new(frame: &Frame<'_>, surfaces: &FrameSurfaces<'_>, content: &Sheets<'_>) -> Self {
+    fn new(picture: &Picture, content: &Sheets<'_>) -> Self {
         let (is_quantized, has_gradients) = match content.vertices {
             SheetVertices::Exact { gradients, .. } => (false, !gradients.is_empty()),
             SheetVertices::Quantized { gradients, .. } => (true, !gradients.is_empty()),
@@ -66,8 +67,8 @@ impl Form {
             has_gradients,
             is_lit: content.light.is_some(),
             has_rows: content.transfer.rows() > 1,
-            is_parallel: matches!(frame.camera.projection, Projection::Orthographic { .. }),
-            has_surfaces: !surfaces.is_empty(),
+            is_parallel: matches!(picture.view.camera.projection, Projection::Orthographic { .. }),
+            has_surfaces: !picture.surfaces.is_empty(),
         }
     }
 
@@ -100,28 +101,32 @@ impl SheetStacks {
             module: shader_module(gpu, sheets::LABEL, sheets::SOURCE),
             pipelines: HashMap::new(),
             store: Store::default(),
+            tables: None,
         })
     }
 
-    /// Draws a checked frame of sheets, of which one has triangles.
-    pub(crate) fn draw(
+    /// Adds a checked part of sheets to a picture, of which one has triangles.
+    pub(crate) fn add(
         &mut self,
         gpu: &Gpu,
-        (tiles, band): (&mut Tiles, &mut Option<Band>),
-        (frame, surfaces): (&Frame<'_>, &FrameSurfaces<'_>),
+        tiles: &mut Tiles,
+        (picture, jobs): (&mut Picture, &mut Jobs),
         content: &Sheets<'_>,
-    ) -> Result<Drawn, Failure> {
-        let pipeline = self.pipeline(gpu, Form::new(frame, surfaces, content))?;
+    ) -> Result<u32, Failure> {
+        let pipeline = self.pipeline(gpu, Form::new(picture, content))?;
         let Held { parts, .. } = self.store.hold(gpu, content)?;
         let runs = runs(content.sheets, parts.iter().map(|part| part.triangles.clone()));
-        let tables = gpu.checked(|| Tables::new(gpu, content))?;
+        let (listed, place_of) = listed(content.sheets);
+        let tables = self.tables.take();
+        let tables = gpu.checked(|| Tables::of(tables, gpu, content, listed))?;
         let layout = &self.layout;
-        let bind = |tile| {
-            let frame = shader_frame((frame, surfaces), content, tile);
-            let frame = buffer(gpu, "volery sheets frame", &[frame], wgpu::BufferUsages::UNIFORM);
-            parts.iter().map(|part| tables.bind(gpu, layout, (&frame, surfaces.view()), part)).collect()
+        let bind = |picture: &Picture, place: usize| {
+            let frame = shader_frame(picture, content, picture.tiles[place].tile);
+            let frame =
+                buffer(gpu, Upload::Views, "volery sheets frame", &[frame], wgpu::BufferUsages::UNIFORM);
+            let surfaces = picture.surfaces.of_tile(place);
+            parts.iter().map(|part| tables.bind(gpu, layout, (&frame, surfaces), part)).collect()
         };
-        let colors = content.emitted();
         let encode = |pass: &mut wgpu::RenderPass<'_>, bound: &Vec<wgpu::BindGroup>| {
             pass.set_pipeline(&pipeline);
             let mut last_part = None;
@@ -130,12 +135,15 @@ impl SheetStacks {
                     pass.set_bind_group(0, &bound[*part], &[]);
                     pass.set_index_buffer(parts[*part].indices.slice(..), wgpu::IndexFormat::Uint32);
                 }
-                pass.draw_indexed(3 * triangles.start..3 * triangles.end, 0, *sheet..*sheet + 1);
+                let place = place_of[*sheet as usize];
+                pass.draw_indexed(3 * triangles.start..3 * triangles.end, 0, place..place + 1);
             }
         };
-        let drawn = tiles.draw(gpu, band, (frame, surfaces), colors, bind, encode);
+        let kind = PartKind::sheets(content);
+        let number = tiles.add(gpu, (picture, jobs), kind, bind, encode);
+        self.tables = Some(tables);
         self.store.forget_nameless();
-        drawn
+        number
     }
 
     /// The pipeline of one form, compiled if this is the first frame that needs it.
@@ -150,20 +158,34 @@ impl SheetStacks {
     }
 }
 
-/// What is uploaded for each frame.
+/// What fragments and sheets are looked up in, on the device.
 struct Tables {
-    thicknesses: wgpu::Buffer,
+    transfer: Revision,
     entries: wgpu::Buffer,
+    /// In the order of the sheets' first triangles, so that turning the stack around changes nothing.
+    listed: Vec<sheets::Sheet>,
+    listing: wgpu::Buffer,
 }
 
 impl Tables {
-    fn new(gpu: &Gpu, content: &Sheets<'_>) -> Self {
+    /// Those of a part: what there is, or new.
+    fn of(kept: Option<Self>, gpu: &Gpu, content: &Sheets<'_>, listed: Vec<sheets::Sheet>) -> Self {
         let storage = wgpu::BufferUsages::STORAGE;
-        let thicknesses: Vec<_> = content.sheets.iter().map(|sheet| sheet.thickness).collect();
-        Self {
-            thicknesses: uploaded(gpu, "volery sheet thicknesses", &thicknesses, storage),
-            entries: uploaded(gpu, "volery sheet transfer", content.transfer.entries(), storage),
-        }
+        let transfer = content.transfer.revision();
+        let (kept_entries, kept_listing) = match kept {
+            None => (None, None),
+            Some(kept) => (
+                (kept.transfer == transfer).then_some(kept.entries),
+                (kept.listed == listed).then_some(kept.listing),
+            ),
+        };
+        let entries = kept_entries.unwrap_or_else(|| {
+            let entries = content.transfer.entries();
+            uploaded(gpu, Upload::Transfers, "volery sheet transfer", entries, storage)
+        });
+        let listing = kept_listing
+            .unwrap_or_else(|| uploaded(gpu, Upload::Geometry, "volery sheets", &listed, storage));
+        Self { transfer, entries, listed, listing }
     }
 
     fn bind(
@@ -178,7 +200,7 @@ impl Tables {
             "points" => part.points.as_entire_binding(),
             // Something must be bound where nothing is read.
             "gradients" => part.gradients.as_ref().unwrap_or(&part.points).as_entire_binding(),
-            "thicknesses" => self.thicknesses.as_entire_binding(),
+            "listing" => self.listing.as_entire_binding(),
             "surfaces" => wgpu::BindingResource::TextureView(surfaces),
             // A binding that the shader gains and this does not know fails as one of the wrong kind.
             _ => self.entries.as_entire_binding(),
@@ -186,8 +208,26 @@ impl Tables {
     }
 }
 
+/// Sheets in the order of their first triangles, as the shader has them, and the place of each in that.
+fn listed(stack: &[Sheet]) -> (Vec<sheets::Sheet>, Vec<u32>) {
+    let mut order: Vec<usize> = (0..stack.len()).collect();
+    order.sort_by_key(|&number| (stack[number].first, stack[number].count, stack[number].counted));
+    let mut place_of = vec![0; stack.len()];
+    (0..).zip(&order).for_each(|(place, &number)| place_of[number] = place);
+    let shader_sheet = |&number: &usize| {
+        let counted = match stack[number].counted {
+            Counted::All => sheets::ALL,
+            Counted::Rising => sheets::RISING,
+            Counted::Falling => sheets::FALLING,
+        };
+        sheets::Sheet { thickness: stack[number].thickness, counted, ..bytemuck::Zeroable::zeroed() }
+    };
+    (order.iter().map(shader_sheet).collect(), place_of)
+}
+
 /// Sheets as draws of parts, in order; parts are consecutive triangles.
 fn runs(sheets: &[Sheet], parts: impl Iterator<Item = Range<u32>> + Clone) -> Vec<Run> {
+    let is_alike = |a: &Sheet, b: &Sheet| (a.thickness, a.counted) == (b.thickness, b.counted);
     let mut runs: Vec<Run> = Vec::new();
     for (number, sheet) in (0..).zip(sheets) {
         let whole = sheet.first..sheet.first + sheet.count;
@@ -200,7 +240,7 @@ fn runs(sheets: &[Sheet], parts: impl Iterator<Item = Range<u32>> + Clone) -> Ve
             match runs.last_mut() {
                 Some(last)
                     if (last.part, last.triangles.end) == (part, triangles.start)
-                        && sheets[last.sheet as usize].thickness == sheet.thickness =>
+                        && is_alike(&sheets[last.sheet as usize], sheet) =>
                 {
                     last.triangles.end = triangles.end;
                 }
@@ -212,11 +252,8 @@ fn runs(sheets: &[Sheet], parts: impl Iterator<Item = Range<u32>> + Clone) -> Ve
 }
 
 /// The shader's frame for a tile.
-fn shader_frame(
-    (frame, surfaces): (&Frame<'_>, &FrameSurfaces<'_>),
-    content: &Sheets<'_>,
-    tile: Tile,
-) -> sheets::Frame {
+fn shader_frame(picture: &Picture, content: &Sheets<'_>, tile: Tile) -> sheets::Frame {
+    let Picture { view: frame, surfaces, .. } = picture;
     let view = TileView::new(frame, tile, 1.0);
     let origin_from_eye = content.origin - frame.camera.eye;
     let quantization = match content.vertices {
@@ -257,7 +294,12 @@ mod tests {
 
     #[test]
     fn runs_are_the_triangles_of_the_sheets_in_order() {
-        let sheet = |first, count, thickness| Sheet { first, count, thickness: [thickness, 0.0] };
+        let sheet = |first, count, thickness| Sheet {
+            first,
+            count,
+            thickness: [thickness, 0.0],
+            counted: Counted::All,
+        };
         let sheets =
             [sheet(4, 3, 1.0), sheet(7, 0, 2.0), sheet(7, 2, 1.0), sheet(9, 1, 2.0), sheet(0, 4, 2.0)];
         let run = |part, triangles, sheet| Run { part, triangles, sheet };

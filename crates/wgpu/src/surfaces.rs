@@ -1,8 +1,8 @@
 //! The pass that draws opaque surfaces before all else, into a texture of colours and depths.
 //!
 //! # Method
-//! Triangles go to the device as nine numbers each, relative to the middle of all meshes. They stay there while frames
-//! have the same meshes, told by comparing them with a copy: no name of a mesh can be stale. What is nearest is left to the
+//! Triangles go to the device as nine numbers each, relative to the middle of all meshes. They stay there while pictures
+//! have the same meshes, told by their revisions. What is nearest is left to the
 //! depth buffer, in 32 bits and reversed, from 1 at the nearest point of all meshes to 0 at the farthest: so floats hold
 //! it to the last digit, wherever the eye is. Of equals the first stays.
 //!
@@ -16,13 +16,15 @@
 use std::ops::Range;
 
 use glam::DVec3;
-use volery_frame::Frame;
+use volery_frame::{PictureView, Revision};
 use volery_scene::TriangleMesh;
 use volery_shaders::surfaces;
 
 use crate::bindings::{bind_group, bind_group_layout, buffer, pipeline_layout, shader_module};
-use crate::gpu::{Failure, Gpu};
-use crate::tiles::{Affine, Tile, TileView};
+use crate::gpu::{Failure, Gpu, Upload};
+use crate::jobs::Jobs;
+use crate::picture::{PictureTile, Tile};
+use crate::tiles::{Affine, TileView};
 
 /// See the module's limits.
 const NEAR: f64 = 1e-9;
@@ -48,12 +50,13 @@ pub(crate) struct Surfaces {
     /// To be bound where there is no surface.
     none: wgpu::TextureView,
     held: Option<Held>,
-    targets: Option<Targets>,
+    /// Textures to draw to: of each tile, and the depths of the largest.
+    targets: Option<(Vec<wgpu::Texture>, wgpu::TextureView)>,
 }
 
 /// Meshes on the device.
 struct Held {
-    meshes: Vec<TriangleMesh>,
+    meshes: Vec<Revision>,
     origin: DVec3,
     /// Of all points.
     bounds: [DVec3; 2],
@@ -67,163 +70,148 @@ struct Chunk {
     runs: Vec<(Range<u32>, u32)>,
 }
 
-/// Textures to draw to.
-#[derive(Clone)]
-struct Targets {
-    size: [u32; 2],
-    color: wgpu::TextureView,
-    depth: wgpu::TextureView,
-}
-
 impl Surfaces {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Failure> {
         gpu.checked(|| Self {
             layout: bind_group_layout(&gpu.device, "volery surfaces", surfaces::BINDINGS),
             module: shader_module(gpu, surfaces::LABEL, surfaces::SOURCE),
             pipeline: None,
-            none: view(gpu, [1, 1], COLOR),
+            none: view_of(&texture(gpu, [1, 1], COLOR)),
             held: None,
             targets: None,
         })
     }
 
-    /// The surfaces of a checked frame, to be drawn in tiles of up to so many pixels.
-    pub(crate) fn of_frame<'a>(
-        &'a mut self,
-        gpu: &'a Gpu,
-        frame: &'a Frame<'a>,
-        size: [u32; 2],
-    ) -> Result<FrameSurfaces<'a>, Failure> {
-        if !has_surfaces(frame) {
-            return Ok(FrameSurfaces { gpu, none: &self.none, drawn: None });
+    /// Draws the surfaces of a picture that begins.
+    pub(crate) fn draw(
+        &mut self,
+        gpu: &Gpu,
+        jobs: &mut Jobs,
+        picture: &PictureView<'_>,
+        tiles: &[PictureTile],
+    ) -> Result<PictureSurfaces, Failure> {
+        if picture.meshes.iter().all(|mesh| mesh.triangles().is_empty()) {
+            return Ok(PictureSurfaces { views: vec![self.none.clone()], zero_depth: None });
         }
-        if self.held.as_ref().is_none_or(|held| held.meshes != frame.meshes) {
+        let is_held =
+            |held: &&Held| held.meshes.iter().copied().eq(picture.meshes.iter().map(TriangleMesh::revision));
+        if self.held.as_ref().filter(is_held).is_none() {
             self.held = None;
-            self.held = Some(gpu.checked(|| Held::new(gpu, frame.meshes))?);
+            self.held = Some(gpu.checked(|| Held::new(gpu, picture.meshes))?);
         }
-        if self.targets.as_ref().is_none_or(|targets| targets.size != size) {
-            self.targets = None;
-            self.targets = Some(gpu.checked(|| Targets {
-                size,
-                color: view(gpu, size, COLOR),
-                depth: view(gpu, size, DEPTH),
-            })?);
-        }
-        if self.pipeline.is_none() {
-            self.pipeline = Some(gpu.checked(|| render_pipeline(gpu, &self.layout, &self.module))?);
-        }
-        let Self { layout, pipeline, none, held, targets, .. } = self;
-        let drawn = match (held, targets, pipeline) {
-            (Some(held), Some(targets), Some(pipeline)) => {
-                let zero_depth = held.depths(frame)[0].max(0.0);
-                Some(Drawing { frame, held, targets, pipeline, layout, zero_depth })
-            }
-            _ => None,
+        let fits = |(textures, _): &(Vec<wgpu::Texture>, _)| {
+            let sizes = textures.iter().map(|texture| [texture.width(), texture.height()]);
+            sizes.eq(tiles.iter().map(|tile| tile.tile.size))
         };
-        Ok(FrameSurfaces { gpu, none, drawn })
-    }
-}
-
-/// Whether a frame has any surface.
-pub(crate) fn has_surfaces(frame: &Frame<'_>) -> bool {
-    frame.meshes.iter().any(|mesh| !mesh.triangles().is_empty())
-}
-
-/// The surfaces of one frame.
-pub(crate) struct FrameSurfaces<'a> {
-    gpu: &'a Gpu,
-    none: &'a wgpu::TextureView,
-    drawn: Option<Drawing<'a>>,
-}
-
-struct Drawing<'a> {
-    frame: &'a Frame<'a>,
-    held: &'a Held,
-    targets: &'a Targets,
-    pipeline: &'a wgpu::RenderPipeline,
-    layout: &'a wgpu::BindGroupLayout,
-    zero_depth: f64,
-}
-
-/// What the surfaces of a tile bind.
-pub(crate) struct BoundSurfaces {
-    size: [u32; 2],
-    chunks: Vec<wgpu::BindGroup>,
-}
-
-impl FrameSurfaces<'_> {
-    pub(crate) fn is_empty(&self) -> bool {
-        self.drawn.is_none()
-    }
-
-    /// The texture to read: colours and depths of a tile that was drawn. Something to be bound where there is none.
-    pub(crate) fn view(&self) -> &wgpu::TextureView {
-        self.drawn.as_ref().map_or(self.none, |drawn| &drawn.targets.color)
+        let (textures, depth) = match self.targets.take().filter(fits) {
+            Some(targets) => targets,
+            None => gpu.checked(|| {
+                let textures = tiles.iter().map(|tile| texture(gpu, tile.tile.size, COLOR)).collect();
+                // The first tile is as large as any.
+                (textures, view_of(&texture(gpu, tiles[0].tile.size, DEPTH)))
+            })?,
+        };
+        let pipeline = match self.pipeline.take() {
+            Some(pipeline) => pipeline,
+            None => gpu.checked(|| render_pipeline(gpu, &self.layout, &self.module))?,
+        };
+        let views: Vec<_> = textures.iter().map(view_of).collect();
+        let mut zero_depth = None;
+        if let Some(held) = &self.held {
+            let zero = *zero_depth.insert(held.depths(picture)[0].max(0.0));
+            jobs.begin(None);
+            gpu.checked(|| {
+                for (tile, view) in tiles.iter().zip(&views) {
+                    let bound = self.bind(gpu, held, &shader_frame(picture, held, zero, tile.tile));
+                    jobs.submit(gpu, |encoder, clock, _| {
+                        let mut pass = begin_pass(
+                            encoder,
+                            [view, &depth],
+                            tile.tile.size,
+                            picture.background,
+                            clock.render(true, true),
+                        );
+                        held.encode(&mut pass, &pipeline, &bound);
+                    });
+                }
+            })?;
+        }
+        self.targets = Some((textures, depth));
+        self.pipeline = Some(pipeline);
+        Ok(PictureSurfaces { views, zero_depth })
     }
 
-    /// The depth, along the view direction from the plane of the eye on, that is 0 in the texture.
-    pub(crate) fn zero_depth(&self) -> f64 {
-        self.drawn.as_ref().map_or(0.0, |drawn| drawn.zero_depth)
-    }
-
-    /// What a tile binds, if the frame has surfaces.
-    pub(crate) fn bind(&self, tile: Tile) -> Option<BoundSurfaces> {
-        let Drawing { frame, held, layout, zero_depth, .. } = self.drawn.as_ref()?;
-        let shader_frame = shader_frame(frame, held, *zero_depth, tile);
-        let uniform = buffer(self.gpu, "volery surfaces frame", &[shader_frame], wgpu::BufferUsages::UNIFORM);
+    /// What a tile binds with each chunk.
+    fn bind(&self, gpu: &Gpu, held: &Held, frame: &surfaces::Frame) -> Vec<wgpu::BindGroup> {
+        let uniform =
+            buffer(gpu, Upload::Views, "volery surfaces frame", &[*frame], wgpu::BufferUsages::UNIFORM);
         // A binding that the shader gains and this does not know fails as one of the wrong kind.
         let bind = |chunk: &Chunk| {
-            bind_group(self.gpu, layout, surfaces::BINDINGS, |name| match name {
+            bind_group(gpu, &self.layout, surfaces::BINDINGS, |name| match name {
                 "frame" => uniform.as_entire_binding(),
                 "corners" => chunk.corners.as_entire_binding(),
                 _ => held.colors.as_entire_binding(),
             })
         };
-        Some(BoundSurfaces { size: tile.size, chunks: held.chunks.iter().map(bind).collect() })
+        held.chunks.iter().map(bind).collect()
+    }
+}
+
+/// The surfaces of a picture, drawn.
+pub(crate) struct PictureSurfaces {
+    /// Of each tile, or one for all where there is no surface.
+    views: Vec<wgpu::TextureView>,
+    zero_depth: Option<f64>,
+}
+
+impl PictureSurfaces {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.zero_depth.is_none()
     }
 
-    /// Draws the surfaces of a tile.
-    pub(crate) fn encode(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
-        tile: &BoundSurfaces,
-    ) {
-        let Some(Drawing { frame, held, targets, pipeline, .. }) = &self.drawn else { return };
-        let [r, g, b] = frame.background.map(f64::from);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("volery surfaces"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &targets.color,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: FAR }),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &targets.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
-                }),
-                stencil_ops: None,
-            }),
-            timestamp_writes,
-            ..Default::default()
-        });
-        let [width, height] = tile.size;
-        pass.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
-        pass.set_scissor_rect(0, 0, width, height);
-        pass.set_pipeline(pipeline);
-        for (chunk, bound) in held.chunks.iter().zip(&tile.chunks) {
-            pass.set_bind_group(0, bound, &[]);
-            for (triangles, mesh) in &chunk.runs {
-                pass.draw(3 * triangles.start..3 * triangles.end, *mesh..*mesh + 1);
-            }
-        }
+    /// The texture to read in a tile: colours and depths. Something to be bound where there is none.
+    pub(crate) fn of_tile(&self, place: usize) -> &wgpu::TextureView {
+        &self.views[place % self.views.len()]
     }
+
+    /// The depth, along the view direction from the plane of the eye on, that is 0 in the texture.
+    pub(crate) fn zero_depth(&self) -> f64 {
+        self.zero_depth.unwrap_or(0.0)
+    }
+}
+
+/// A pass that draws colours and depths to the corner of two textures.
+fn begin_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    [color, depth]: [&wgpu::TextureView; 2],
+    [width, height]: [u32; 2],
+    background: [f32; 3],
+    timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+) -> wgpu::RenderPass<'a> {
+    let [r, g, b] = background.map(f64::from);
+    let nothing = wgpu::Color { r, g, b, a: FAR };
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("volery surfaces"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: color,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(nothing), store: wgpu::StoreOp::Store },
+        })],
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(0.0),
+                store: wgpu::StoreOp::Discard,
+            }),
+            stencil_ops: None,
+        }),
+        timestamp_writes,
+        ..Default::default()
+    });
+    pass.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
+    pass.set_scissor_rect(0, 0, width, height);
+    pass
 }
 
 impl Held {
@@ -241,7 +229,7 @@ impl Held {
         let mut finish = |corners: &mut Vec<[[f32; 3]; 3]>, runs: &mut Vec<_>| {
             if !corners.is_empty() {
                 let corners = std::mem::take(corners);
-                let corners = buffer(gpu, "volery surface triangles", &corners, storage);
+                let corners = buffer(gpu, Upload::Geometry, "volery surface triangles", &corners, storage);
                 chunks.push(Chunk { corners, runs: std::mem::take(runs) });
             }
         };
@@ -267,31 +255,47 @@ impl Held {
             [r, g, b, 0.0].map(|channel| channel as f32)
         };
         let colors: Vec<[f32; 4]> = meshes.iter().map(color).collect();
-        let colors = buffer(gpu, "volery surface colours", &colors, storage);
-        Self { meshes: meshes.to_vec(), origin, bounds, colors, chunks }
+        let colors = buffer(gpu, Upload::Geometry, "volery surface colours", &colors, storage);
+        let meshes = meshes.iter().map(TriangleMesh::revision).collect();
+        Self { meshes, origin, bounds, colors, chunks }
+    }
+
+    fn encode(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipeline: &wgpu::RenderPipeline,
+        bound: &[wgpu::BindGroup],
+    ) {
+        pass.set_pipeline(pipeline);
+        for (chunk, bound) in self.chunks.iter().zip(bound) {
+            pass.set_bind_group(0, bound, &[]);
+            for (triangles, mesh) in &chunk.runs {
+                pass.draw(3 * triangles.start..3 * triangles.end, *mesh..*mesh + 1);
+            }
+        }
     }
 
     /// Least and greatest depth of the meshes' bounds.
-    fn depths(&self, frame: &Frame<'_>) -> [f64; 2] {
-        let [_, _, forward] = frame.camera.axes();
+    fn depths(&self, picture: &PictureView<'_>) -> [f64; 2] {
+        let [_, _, forward] = picture.camera.axes();
         let [low, high] = self.bounds;
-        let depth = |corner: DVec3| (corner - frame.camera.eye).dot(forward);
+        let depth = |corner: DVec3| (corner - picture.camera.eye).dot(forward);
         let is_down = forward.cmplt(DVec3::ZERO);
         [depth(DVec3::select(is_down, high, low)), depth(DVec3::select(is_down, low, high))]
     }
 }
 
 /// The shader's frame for a tile.
-fn shader_frame(frame: &Frame<'_>, held: &Held, zero_depth: f64, tile: Tile) -> surfaces::Frame {
-    let view = TileView::new(frame, tile, 1.0);
-    let origin_from_eye = held.origin - frame.camera.eye;
+fn shader_frame(picture: &PictureView<'_>, held: &Held, zero_depth: f64, tile: Tile) -> surfaces::Frame {
+    let view = TileView::new(picture, tile, 1.0);
+    let origin_from_eye = held.origin - picture.camera.eye;
     // A little wider, so that no point is clipped that is in front of the eye.
-    let far = (held.depths(frame)[1] * (1.0 + 1e-6)).max(f64::MIN_POSITIVE);
+    let far = (held.depths(picture)[1] * (1.0 + 1e-6)).max(f64::MIN_POSITIVE);
     let near = (zero_depth * (1.0 - 1e-6)).max(if view.is_parallel { 0.0 } else { NEAR * far });
     // Over `w`: the nearest is 1, the farthest 0.
     let scale = if view.is_parallel { 1.0 } else { near } / (far - near);
     let reversed = Affine { slope: -view.forward * scale, rest: far * scale };
-    let rays = frame.camera.rays(frame.width, frame.height);
+    let rays = picture.camera.rays(picture.width, picture.height);
     let [first_x, first_y] = tile.first.map(f64::from);
     let at = |corner: DVec3, dx: DVec3, dy: DVec3| corner + dx * first_x + dy * first_y;
     let toward = at(rays.toward, rays.toward_dx, rays.toward_dy);
@@ -312,8 +316,8 @@ fn shader_frame(frame: &Frame<'_>, held: &Held, zero_depth: f64, tile: Tile) -> 
     }
 }
 
-fn view(gpu: &Gpu, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> wgpu::TextureView {
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+fn texture(gpu: &Gpu, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("volery surfaces"),
         size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         mip_level_count: 1,
@@ -322,7 +326,10 @@ fn view(gpu: &Gpu, [width, height]: [u32; 2], format: wgpu::TextureFormat) -> wg
         format,
         usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
-    });
+    })
+}
+
+fn view_of(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 

@@ -1,27 +1,33 @@
 //! From a frame to the numbers that the shader reads: in f64 up to the last step.
 
 use glam::DVec3;
-use volery_frame::{Frame, RayTransfer, VolumeLayout};
+use volery_frame::{PictureView, RayTransfer, VolumeLayout};
 use volery_scene::RayGrid;
 use volery_shaders::raycast;
 
+use crate::picture::{Picture, Tile};
 use crate::pool::Pool;
-use crate::surfaces::FrameSurfaces;
 use crate::units::Units;
 
 /// The depth at which rays start: where the volume begins, so that nothing of it lies before their start and f32 loses
 /// nothing to a far eye.
-fn start_depth(frame: &Frame<'_>, layout: &VolumeLayout) -> f64 {
-    let [_, _, forward] = frame.camera.axes();
+fn start_depth(picture: &PictureView<'_>, layout: &VolumeLayout) -> f64 {
+    let [_, _, forward] = picture.camera.axes();
     let extent = DVec3::from_array(layout.cells.map(f64::from)) * layout.spacing;
     // The nearest corner is the one that lies most against the view.
     let nearest = DVec3::select(forward.cmplt(DVec3::ZERO), extent, DVec3::ZERO);
-    (nearest - frame.camera.eye).dot(forward).max(0.0)
+    (nearest - picture.camera.eye).dot(forward).max(0.0)
 }
 
-/// The rays of a picture that start at a depth.
-fn rays_from(frame: &Frame<'_>, depth: f64) -> RayGrid {
-    let rays = frame.camera.rays(frame.width, frame.height);
+/// The rays of a tile that start at a depth.
+fn rays_from(picture: &PictureView<'_>, tile: Tile, depth: f64) -> RayGrid {
+    let rays = picture.camera.rays(picture.width, picture.height);
+    let [column, row] = tile.first.map(f64::from);
+    let rays = RayGrid {
+        origin: rays.origin + rays.origin_dx * column + rays.origin_dy * row,
+        toward: rays.toward + rays.toward_dx * column + rays.toward_dy * row,
+        ..rays
+    };
     // The directions' part along `forward` is 1, so a depth is a factor.
     RayGrid {
         origin: rays.origin + rays.toward * depth,
@@ -31,16 +37,16 @@ fn rays_from(frame: &Frame<'_>, depth: f64) -> RayGrid {
     }
 }
 
-/// The shader's frame; the band of rows is still open.
+/// The shader's frame for a tile.
 pub(crate) fn shader_frame(
-    frame: &Frame<'_>,
+    picture: &Picture,
+    tile: Tile,
     transfer: &RayTransfer,
-    layout: &VolumeLayout,
-    units: &Units,
-    (pool, surfaces): (&Pool, &FrameSurfaces<'_>),
+    (pool, units): (&Pool, &Units),
 ) -> raycast::Frame {
-    let start_depth = start_depth(frame, layout);
-    let rays = rays_from(frame, start_depth);
+    let layout = pool.layout();
+    let start_depth = start_depth(&picture.view, layout);
+    let rays = rays_from(&picture.view, tile, start_depth);
     let in_cells = |v: DVec3| (v / layout.spacing).as_vec3().to_array();
     // Directions are only directions: of any length, so of one that f32 holds.
     let longest = rays.toward.length().max(f64::MIN_POSITIVE);
@@ -51,11 +57,11 @@ pub(crate) fn shader_frame(
     let texels_per_step = pool.texels_per_unit();
     raycast::Frame {
         origin: in_cells(rays.origin),
-        width: frame.width,
+        width: tile.size[0],
         origin_dx: in_cells(rays.origin_dx),
-        end_row: 0,
+        height: tile.size[1],
         origin_dy: in_cells(rays.origin_dy),
-        first_row: 0,
+        is_first: picture.is_first().into(),
         toward: direction(rays.toward),
         unit_cells: units.unit_cells as f32,
         toward_dx: direction(rays.toward_dx),
@@ -66,13 +72,13 @@ pub(crate) fn shader_frame(
         bricks_per_cell: 1.0 / layout.brick_cells as f32,
         depth_per_cell: depth.as_vec3().to_array(),
         texels_per_step: texels_per_step as f32,
-        background: frame.background,
         texel_origin: transfer.texel_origin() as f32,
         atlas_scale: pool.texture_size().map(|n| 1.0 / n as f32),
         last_entry: transfer.last_entry() as f32,
         slices_per_row: pool.slot().slices_per_row as f32,
         rows_per_slice: 1.0 / pool.slot().slices_per_row as f32,
         slot_height: pool.slot().size[1] as f32,
+        slots_per_layer: pool.slots_per_layer(),
         bins_per_texel: bins_per_texel as f32,
         first_bin: first_bin as f32,
         // Depths of stretches are to the base 2.
@@ -80,7 +86,7 @@ pub(crate) fn shader_frame(
         depth_scale: transfer.depth_scale() as f32,
         num_bands: transfer.bands().len() as u32,
         huge_range: transfer.huge_range() as f32,
-        surface_offset: (surfaces.zero_depth() - start_depth) as f32,
+        surface_offset: (picture.surfaces.zero_depth() - start_depth) as f32,
         cells_per_depth: (longest / spacing) as f32,
         ..bytemuck::Zeroable::zeroed()
     }

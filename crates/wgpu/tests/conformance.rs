@@ -3,6 +3,7 @@
 //! Without a device every test fails, unless `VOLERY_WITHOUT_GPU` is set: then all are counted as ignored.
 
 mod cubes;
+mod embed;
 mod sheets;
 
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -19,6 +20,7 @@ fn main() {
         .iter()
         .chain(cubes::ALL)
         .chain(sheets::ALL)
+        .chain(embed::ALL)
         .map(|&property| trial(property).with_ignored_flag(without_gpu))
         .collect();
     let conclusion = libtest_mimic::run(&arguments, trials);

@@ -6,13 +6,13 @@
 struct Frame {
     // Of the volume, in finest cells.
     cells: vec3f,
+    // Pixels of this tile of the picture.
     width: u32,
-    background: vec3f,
-    // One past the last row of this band of the picture.
-    end_row: u32,
     // Entries of the grid of bricks along each axis.
     grid_dims: vec3u,
-    first_row: u32,
+    height: u32,
+    // Whether this is the first part of the picture: 0 or 1.
+    is_first: u32,
     brick_cells: f32,
     bricks_per_cell: f32,
     // Entries of the grid per finest cell.
@@ -65,6 +65,8 @@ struct Brick {
 
 // Whether texels are colours.
 override HAS_COLORS: bool = false;
+// Whether the grid holds bricks that are not of this part.
+override HAS_OTHERS: bool = false;
 // Whether surfaces hide what is behind them.
 override HAS_SURFACES: bool = false;
 
@@ -91,9 +93,12 @@ const ROW_MASK: u32 = 0xffff;
 @group(0) @binding(4) var<storage, read> entries: array<vec2u>;
 // The transfer function's control points: texel, colour, opacity.
 @group(0) @binding(5) var<storage, read> points: array<f32>;
-@group(0) @binding(6) var<storage, read_write> picture: array<f32>;
-// Of each pixel of this band, colour and depth in the world's lengths.
+// Of each pixel of this tile, the colour it has gathered from the front, and the share of light that still comes through.
+@group(0) @binding(6) var<storage, read_write> gathered: array<vec4f>;
+// Of each pixel of this tile, colour and depth in the world's lengths.
 @group(0) @binding(7) var surfaces: texture_2d<f32>;
+// A bit per brick, set where it is of this part.
+@group(0) @binding(8) var<storage, read> chosen: array<u32>;
 
 struct Hit {
     place: vec3f,
@@ -168,6 +173,9 @@ fn find(cell: vec3f) -> u32 {
         run = select(vec2u(run.x, half), vec2u(run.x + half, run.y - half), is_before);
     }
     let from_low = cell - bricks[run.x].first_cell;
+    if HAS_OTHERS && ((chosen[run.x / 32u] >> (run.x % 32u)) & 1u) == 0u {
+        return NO_BRICK;
+    }
     let is_held = run.y == 1u && all(from_low >= vec3f(0.0)) && all(from_low < vec3f(size_of(run.x)));
     return select(NO_BRICK, run.x, is_held);
 }
@@ -322,22 +330,22 @@ fn shade(light: Light, plane: u32, hit: Hit) -> Light {
     return add(sum, color.rgb, select(1.0, color.a, frame.is_transparent != 0u));
 }
 
-// Colour behind all planes, and the depth from which on nothing is seen, but for the offset of the tile.
-fn end_of(pixel_of_band: vec2u) -> vec4f {
+// The depth from which on nothing is seen, but for the offset of the tile.
+fn end_of(pixel: vec2u) -> f32 {
     if !HAS_SURFACES {
-        return vec4f(frame.background, BLANK);
+        return BLANK;
     }
-    let surface = textureLoad(surfaces, pixel_of_band, 0);
-    return vec4f(surface.rgb, surface.a * frame.depths_per_length);
+    return textureLoad(surfaces, pixel, 0).a * frame.depths_per_length;
 }
 
-fn light_of(first_plane: u32, pixel: vec2f, end: vec4f) -> vec3f {
-    var light = Light(vec3f(0.0), 1.0);
+// The light of all planes up to an end, behind what was gathered.
+fn light_of(first_plane: u32, pixel: vec2f, end: f32, before: Light) -> Light {
+    var light = before;
     // Planes that the pixel has still to see.
     var open = 0u;
     for (var i = 0u; i < frame.num_planes; i++) {
         let hit = hit_of(first_plane + i, pixel);
-        open |= select(0u, 1u << i, hit.is_inside && hit.depth < end.w + tiles[first_plane + i].surface_offset);
+        open |= select(0u, 1u << i, hit.is_inside && hit.depth < end + tiles[first_plane + i].surface_offset);
     }
     while open != 0u && light.transmittance > 0.0 {
         var nearest = NO_PLANE;
@@ -352,21 +360,22 @@ fn light_of(first_plane: u32, pixel: vec2f, end: vec4f) -> vec3f {
         open &= ~(1u << nearest);
         light = shade(light, first_plane + nearest, hit_of(first_plane + nearest, pixel));
     }
-    return light.color + light.transmittance * end.rgb;
+    return light;
 }
 
 @compute @workgroup_size(16, 16)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) in_tile: vec3u) {
-    let pixel = group.xy * TILE + in_tile.xy + vec2u(0u, frame.first_row);
-    if pixel.x >= frame.width || pixel.y >= frame.end_row {
+    let pixel = group.xy * TILE + in_tile.xy;
+    if pixel.x >= frame.width || pixel.y >= frame.height {
         return;
+    }
+    let index = pixel.y * frame.width + pixel.x;
+    var before = Light(vec3f(0.0), 1.0);
+    if frame.is_first == 0u {
+        before = Light(gathered[index].rgb, gathered[index].a);
     }
     let tiles_per_row = (frame.width + TILE - 1u) / TILE;
     let first_plane = (group.y * tiles_per_row + group.x) * frame.num_planes;
-    let end = end_of(pixel - vec2u(0u, frame.first_row));
-    let color = light_of(first_plane, vec2f(in_tile.xy), end);
-    let index = 3u * ((pixel.y - frame.first_row) * frame.width + pixel.x);
-    picture[index] = color.r;
-    picture[index + 1u] = color.g;
-    picture[index + 2u] = color.b;
+    let light = light_of(first_plane, vec2f(in_tile.xy), end_of(pixel), before);
+    gathered[index] = vec4f(light.color, light.transmittance);
 }

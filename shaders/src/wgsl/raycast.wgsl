@@ -16,12 +16,13 @@
 struct Frame {
     // The ray of image point (x, y) starts at `origin + x * origin_dx + y * origin_dy`, directions likewise.
     origin: vec3f,
+    // Pixels of this tile of the picture; image points count from its corner.
     width: u32,
     origin_dx: vec3f,
-    // One past the last row of this band of the picture.
-    end_row: u32,
+    height: u32,
     origin_dy: vec3f,
-    first_row: u32,
+    // Whether this is the first part of the picture: 0 or 1.
+    is_first: u32,
     toward: vec3f,
     // Finest cells per edge of a unit.
     unit_cells: f32,
@@ -37,7 +38,6 @@ struct Frame {
     depth_per_cell: vec3f,
     // What one step of the atlas's numbers is in texels, and where texels are counted from.
     texels_per_step: f32,
-    background: vec3f,
     texel_origin: f32,
     // One over the atlas's size in texels.
     atlas_scale: vec2f,
@@ -47,6 +47,7 @@ struct Frame {
     slices_per_row: f32,
     rows_per_slice: f32,
     slot_height: f32,
+    slots_per_layer: u32,
     // bin = texel * bins_per_texel + first_bin
     bins_per_texel: f32,
     first_bin: f32,
@@ -70,6 +71,8 @@ override IS_WHOLE: bool = false;
 // Whether there are cells for which the table is too coarse. What is not compiled costs nothing: on llvmpipe the code
 // of the exact way alone made rays take almost three times as long.
 override HAS_EXACT: bool = true;
+// Whether units hold bricks that are not of this part.
+override HAS_OTHERS: bool = false;
 // Whether rays end at surfaces.
 override HAS_SURFACES: bool = false;
 
@@ -111,8 +114,9 @@ const CELLS_MASK: u32 = 1023;
 @group(0) @binding(2) var atlas: texture_2d_array<f32>;
 @group(0) @binding(3) var atlas_sampler: sampler;
 @group(0) @binding(4) var transfer: texture_2d<f32>;
-@group(0) @binding(5) var<storage, read_write> picture: array<f32>;
-// Of each pixel of this band, colour and depth.
+// Of each pixel of this tile, the colour it has gathered from the front, and the share of light that still comes through.
+@group(0) @binding(5) var<storage, read_write> gathered: array<vec4f>;
+// Of each pixel of this tile, colour and depth.
 @group(0) @binding(6) var surfaces: texture_2d<f32>;
 // The transfer function's bands, three to a band: [base, low, high, opacity], [opacity slope, clearness, red, green],
 // [blue, red slope, green slope, blue slope]. A texel's place in one is its distance u from the base; it holds those
@@ -121,6 +125,8 @@ const CELLS_MASK: u32 = 1023;
 // The largest doubt of any ray, and the longest way through cells that were read from the table: bits of numbers of at
 // least 0, which are in order as the numbers are.
 @group(0) @binding(8) var<storage, read_write> worst: array<atomic<u32>>;
+// A bit per slot, set where its brick is of this part.
+@group(0) @binding(9) var<storage, read> chosen: array<u32>;
 
 struct Ray {
     start: vec3f,
@@ -133,9 +139,8 @@ struct Ray {
     rising: vec3f,
     // Optical depth per t of matter that has depth 1 per unit length.
     depth_per_t: f32,
-    // Where it ends, and what is seen there.
+    // Where it ends.
     end: f32,
-    behind: vec3f,
 }
 
 struct Light {
@@ -198,14 +203,12 @@ fn ray_of_pixel(pixel: vec2u) -> Ray {
     let direction = select(min(toward, vec3f(-1e-12)), max(toward, vec3f(1e-12)), rising);
     let depth_per_t = length(direction * frame.depth_per_cell);
     var end = FAR;
-    var behind = frame.background;
     if HAS_SURFACES {
-        let surface = textureLoad(surfaces, pixel - vec2u(0u, frame.first_row), 0);
-        end = (surface.a + frame.surface_offset) * frame.cells_per_depth * length(way);
-        behind = surface.rgb;
+        let depth = textureLoad(surfaces, pixel, 0).a;
+        end = (depth + frame.surface_offset) * frame.cells_per_depth * length(way);
     }
     let motion = select(direction, vec3f(0.0), is_still);
-    return Ray(start, direction, motion, 1.0 / direction, select(vec3f(0.0), vec3f(1.0), rising), depth_per_t, end, behind);
+    return Ray(start, direction, motion, 1.0 / direction, select(vec3f(0.0), vec3f(1.0), rising), depth_per_t, end);
 }
 
 // Where a gather reads the corners of a cell in the slice z of a brick.
@@ -217,6 +220,12 @@ fn slice_place(corner: vec2f, z: f32) -> vec2f {
 // A brick's cells per axis, from a unit's second word.
 fn cells_of(word: u32) -> vec3f {
     return vec3f((vec3u(word) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));
+}
+
+// Whether a brick is no part of what is drawn, from a unit's first word.
+fn is_other(word: u32) -> bool {
+    let slot = ((word >> LAYER_SHIFT) & SLOT_MASK) * frame.slots_per_layer + (word & SLOT_MASK);
+    return ((chosen[slot / 32u] >> (slot % 32u)) & 1u) == 0u;
 }
 
 fn corners_of_cell(slot: vec2u, cell: vec3f) -> Corners {
@@ -322,18 +331,18 @@ fn doubt_of_color(a: Piece, b: Piece) -> f32 {
     return depth * depth * largest(abs(b.color - a.color)) * (1.0 / 32.0);
 }
 
-// The light of the matter along a ray.
+// The light of the matter along a ray, behind what it has gathered.
 //
 // One loop, each round of which leaves one box: a cell of a brick, or a cube of empty units. Nested loops would
 // make the rays of a SIMD group wait for one another at the end of each inner one.
-fn light_along(ray: Ray) -> Light {
+fn light_along(ray: Ray, before: vec4f) -> Light {
     let first_faces = (mix(frame.cells, vec3f(0.0), ray.rising) - ray.start) * ray.inverse;
     let last_faces = (mix(vec3f(0.0), frame.cells, ray.rising) - ray.start) * ray.inverse;
     var t = max(largest(first_faces), 0.0);
     let t_end = min(smallest(last_faces), ray.end);
     // The finest cell that the ray is in.
     var place = clamp(floor(ray.start + t * ray.direction), vec3f(0.0), frame.cells - 1.0);
-    var light = Light(vec3f(0.0), 0.0, 1.0, 0.0, 0.0);
+    var light = Light(before.rgb, select(-log2(before.a), 0.0, before.a == 1.0), before.a, 0.0, 0.0);
     // The texel at t, where the cell before was of the same level; its level, or none.
     var end = End(0.0, 0.0, vec4f(0.0));
     var end_level = NO_LEVEL;
@@ -348,7 +357,11 @@ fn light_along(ray: Ray) -> Light {
         let inverse_scale = power_of_2(127u - level);
         let brick_low = floor((place + 0.5) * (frame.bricks_per_cell * inverse_scale)) * (scale * frame.brick_cells);
         let cell = floor((place + 0.5 - brick_low) * inverse_scale);
-        let is_visible = is_occupied && all(cell < cells_of(words.y));
+        var is_passed = false;
+        if HAS_OTHERS && is_occupied {
+            is_passed = is_other(words.x);
+        }
+        let is_visible = is_occupied && !is_passed && all(cell < cells_of(words.y));
         let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
         let stored = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
         let is_matter = is_visible && !is_blank(stored);
@@ -356,8 +369,10 @@ fn light_along(ray: Ray) -> Light {
 
         // The box that this round leaves.
         let radius = f32(words.x) - 1.0;
-        let low = select((unit - radius) * frame.unit_cells, brick_low + cell * scale, is_occupied);
-        let high = low + select((2.0 * radius + 1.0) * frame.unit_cells, scale, is_occupied);
+        let cells = select(1.0, frame.brick_cells, is_passed);
+        let low_cell = select(cell, vec3f(0.0), is_passed);
+        let low = select((unit - radius) * frame.unit_cells, brick_low + low_cell * scale, is_occupied);
+        let high = low + select((2.0 * radius + 1.0) * frame.unit_cells, cells * scale, is_occupied);
         let faces = (mix(low, high, ray.rising) - ray.start) * ray.inverse;
         let exit = max(min(smallest(faces), t_end), t);
         // A round without length finds the value where a run of cells begins.
@@ -416,17 +431,17 @@ fn place_in_tile(lane: u32) -> vec2u {
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let pixel = group.xy * TILE + place_in_tile(lane) + vec2u(0u, frame.first_row);
-    if pixel.x >= frame.width || pixel.y >= frame.end_row {
+    let pixel = group.xy * TILE + place_in_tile(lane);
+    if pixel.x >= frame.width || pixel.y >= frame.height {
         return;
     }
-    let ray = ray_of_pixel(pixel);
-    let light = light_along(ray);
-    let color = light.color + light.transmittance * ray.behind;
+    let index = pixel.y * frame.width + pixel.x;
+    var before = vec4f(0.0, 0.0, 0.0, 1.0);
+    if frame.is_first == 0u {
+        before = gathered[index];
+    }
+    let light = light_along(ray_of_pixel(pixel), before);
     atomicMax(&worst[0], bitcast<u32>(light.doubt));
     atomicMax(&worst[1], bitcast<u32>(light.table_way));
-    let index = 3u * ((pixel.y - frame.first_row) * frame.width + pixel.x);
-    picture[index] = color.r;
-    picture[index + 1u] = color.g;
-    picture[index + 2u] = color.b;
+    gathered[index] = vec4f(light.color, light.transmittance);
 }

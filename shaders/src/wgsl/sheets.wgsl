@@ -39,6 +39,14 @@ struct Frame {
     eye_depth: f32,
 }
 
+// What a sheet's triangles stand for.
+struct Sheet {
+    // At the origin and per length along the normal.
+    thickness: vec2f,
+    // Which of the triangles count.
+    counted: u32,
+}
+
 // Whether vertices are integers, or floats.
 override IS_QUANTIZED: bool = false;
 override HAS_GRADIENTS: bool = false;
@@ -51,6 +59,11 @@ override IS_PARALLEL: bool = false;
 // Whether rays end at surfaces.
 override HAS_SURFACES: bool = false;
 
+// All triangles count; those of an outline where the ray leaves what it is of and goes along the normal, or comes in and
+// goes against it; and those elsewhere.
+const ALL: u32 = 0;
+const RISING: u32 = 1;
+const FALLING: u32 = 2;
 // Rays at a sine below this to a sheet go through as much matter as at this.
 const MIN_COSINE: f32 = 1e-30;
 // As the frame has it.
@@ -66,8 +79,7 @@ const SERIES_DEPTH: f32 = 0.25;
 // Of each vertex the direction in which the value rises, and the magnitude: bits of floats, or signed bytes and one
 // unsigned.
 @group(0) @binding(2) var<storage, read> gradients: array<u32>;
-// Of each sheet, at the origin and per length along the normal.
-@group(0) @binding(3) var<storage, read> thicknesses: array<vec2f>;
+@group(0) @binding(3) var<storage, read> listing: array<Sheet>;
 // Colour and extinction, row after row.
 @group(0) @binding(4) var<storage, read> entries: array<vec4f>;
 // Of each pixel of the tile, colour and depth.
@@ -78,6 +90,7 @@ struct Vertex {
     @location(0) gradient: vec4f,
     // Value, thickness, depth, and what the thickness changes by along the normal.
     @location(1) matter: vec4f,
+    @location(2) @interpolate(flat) counted: u32,
 }
 
 fn point_of(vertex: u32) -> vec4f {
@@ -104,7 +117,7 @@ fn gradient_of(vertex: u32) -> vec4f {
 fn corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) sheet: u32) -> Vertex {
     let point = point_of(vertex);
     let place = vec4f(point.xyz, 1.0);
-    let thickness = thicknesses[sheet];
+    let thickness = listing[sheet].thickness;
     var out: Vertex;
     let w = dot(frame.clip_w, place);
     out.position = vec4f(dot(frame.clip_x, place), dot(frame.clip_y, place), 0.5 * w, w);
@@ -114,6 +127,7 @@ fn corner(@builtin(vertex_index) vertex: u32, @builtin(instance_index) sheet: u3
     let along_normal = dot(frame.normal, point.xyz);
     out.matter =
         vec4f(point.w, thickness.x + thickness.y * along_normal, dot(frame.depth, place), thickness.y);
+    out.counted = listing[sheet].counted;
     return out;
 }
 
@@ -178,15 +192,19 @@ fn share_before(way_to_surface: f32, length: f32, is_slab: bool) -> f32 {
 }
 
 @fragment
-fn matter(in: Vertex) -> @location(0) vec4f {
+fn matter(in: Vertex, @builtin(front_facing) is_coming_in: bool) -> @location(0) vec4f {
     var entry = classify(in.matter.x, in.gradient.w);
     if HAS_GRADIENTS && IS_LIT {
         entry = vec4f(entry.rgb * shade(in.gradient.xyz), entry.a);
     }
     let pixel = in.position.xy - frame.center;
+    let approach = frame.normal_ahead + dot(frame.normal_per_pixel, pixel);
+    if in.counted != ALL && (in.counted == RISING) != (is_coming_in != (approach > 0.0)) {
+        return vec4f(0.0);
+    }
     let slope = pixel * frame.slope_per_pixel;
     let length_per_depth = sqrt(1.0 + dot(slope, slope));
-    let cosine = abs(frame.normal_ahead + dot(frame.normal_per_pixel, pixel)) / length_per_depth;
+    let cosine = abs(approach) / length_per_depth;
     var depth = entry.a * in.matter.y / max(cosine, MIN_COSINE);
     if HAS_SURFACES {
         let end = textureLoad(surfaces, vec2u(in.position.xy), 0).a;

@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use volery::{Backend, Image, Input, InputData};
-use volery_frame::{Content, Frame, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{Content, Counted, Frame, PictureView, Sheet, SheetTransfer, SheetVertices, Sheets};
 use volery_slicing::{MeshSheet, Planes, Slicer};
 use volery_software::SoftwareBackend;
 
@@ -23,6 +23,7 @@ pub(crate) fn draw(input: &Input, count: usize) -> Result<Image, Box<dyn Error>>
         first: sheet.triangles.start,
         count: sheet.triangles.end - sheet.triangles.start,
         thickness: sheet.thickness.map(|t| t as f32),
+        counted: Counted::All,
     };
     let eye = (camera.eye - mesh.origin).dot(mesh.normal);
     let sheets: Vec<_> = mesh.back_to_front(eye).map(sheet).collect();
@@ -30,7 +31,7 @@ pub(crate) fn draw(input: &Input, count: usize) -> Result<Image, Box<dyn Error>>
     let range = of_vertices
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
     let content = Content::Sheets(Sheets {
-        revision: 0,
+        revision: None,
         normal: mesh.normal,
         origin: mesh.origin,
         vertices: SheetVertices::Exact { points: &mesh.points, gradients: &[] },
@@ -41,6 +42,6 @@ pub(crate) fn draw(input: &Input, count: usize) -> Result<Image, Box<dyn Error>>
     });
     let [width, height] = scene.size.ok_or("a scene without a size")?;
     let background = scene.background.ok_or("a scene without a background")?.map(|channel| channel as f32);
-    let frame = Frame { width, height, camera, background, meshes: &[], content };
+    let frame = Frame { view: PictureView { width, height, camera, background, meshes: &[] }, content };
     Ok(SoftwareBackend::new().draw(&frame)?.image)
 }

@@ -7,7 +7,9 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection, Ray};
 
-use crate::{Backend, Content, Cube, Cubes, Frame, Image, Revision, TexelType, Thickness, VolumeLayout};
+use crate::{
+    Backend, Content, Cube, Cubes, Frame, Image, PictureView, Revision, TexelType, Thickness, VolumeLayout,
+};
 
 use super::STOP_TRANSMITTANCE;
 use super::oracle::{assert_background, assert_close, assert_shows_something, chord, each_pixel, over};
@@ -68,8 +70,11 @@ fn draw(
 ) -> Image {
     assert!(camera.defects().is_empty(), "the suite's camera: {:?}", camera.defects());
     backend.set_volume(layout).expect("the suite's volumes are small");
-    let content = Content::Cubes(Cubes { cubes, thickness });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
+    let content = Content::Cubes(Cubes { revision: None, cubes, thickness });
+    let frame = Frame {
+        view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     backend.draw(&frame).expect("cubes need no brick").image
 }
 

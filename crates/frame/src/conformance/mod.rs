@@ -28,6 +28,8 @@ mod levels;
 mod matter;
 mod oracle;
 mod order;
+mod outlines;
+mod parts;
 mod plane_oracle;
 mod planes;
 mod requests;
@@ -186,6 +188,8 @@ properties! { $
         wrong_sheets_are_named
         revisions_name_contents
         sheets_and_rays_in_turn;
+    outlines:
+        outlines_serve_any_eye;
     surfaces:
         surfaces_end_rays
         surfaces_among_planes
@@ -198,6 +202,14 @@ properties! { $
         no_surface_changes_nothing
         surfaces_seen_from_afar
         a_hundred_thousand_triangles;
+    parts:
+        pictures_in_parts_are_the_same
+        parts_of_several_kinds_make_one_picture
+        evicted_bricks_leave_room_for_others
+        nothing_that_was_kept_is_stale
+        cameras_that_move_upload_nothing
+        finished_parts_are_told_once
+        pictures_are_begun_and_ended;
 }
 
 #[cfg(test)]
@@ -217,6 +229,8 @@ mod tests {
             include_str!("cubes.rs"),
             include_str!("sheets.rs"),
             include_str!("surfaces.rs"),
+            include_str!("parts.rs"),
+            include_str!("outlines.rs"),
         ];
         let written = sources.iter().flat_map(|text| text.lines());
         let written: Vec<_> = written.filter(|line| line.starts_with("pub fn ")).collect();

@@ -5,7 +5,8 @@ use volery_scene::{Camera, Plane, Projection, Ray, TransferFunction};
 
 use crate::planes::{OUTLINE_PIXELS, outline_color};
 use crate::{
-    Backend, BlendedBrick, Content, DrawError, Frame, Image, PlacedBrick, Planes, PointTransfer, Sampling,
+    Backend, BlendedBrick, Content, DrawError, Frame, Image, PictureView, PlacedBrick, Planes, PointTransfer,
+    Sampling,
 };
 
 use super::oracle::{Pixels, assert_close};
@@ -85,7 +86,10 @@ pub(super) fn try_draw(
         is_transparent: look.is_transparent,
         shows_bricks: look.shows_bricks,
     });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
+    let frame = Frame {
+        view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     backend.draw(&frame).map(|drawn| drawn.image)
 }
 

@@ -275,7 +275,10 @@ pub fn colors_show_themselves(backend: &mut dyn Backend) {
     }
     let (camera, transfer) = (cameras(volume.extent())[0], &volume.integrated(&smooth_transfer(1.0)));
     let content = crate::Content::Rays(crate::Rays { transfer, bricks: &[] });
-    let frame = crate::Frame { width: 5, height: 5, camera, background: BACKGROUND, meshes: &[], content };
+    let frame = crate::Frame {
+        view: crate::PictureView { width: 5, height: 5, camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     assert_eq!(backend.draw(&frame).err(), Some(DrawError::RaysThroughColors), "rays through colours");
 }
 
@@ -532,6 +535,9 @@ pub fn wrong_frames_of_planes_are_named(backend: &mut dyn Backend) {
         is_transparent: false,
         shows_bricks: false,
     });
-    let frame = crate::Frame { width: 9, height: 9, camera, background: BACKGROUND, meshes: &[], content };
+    let frame = crate::Frame {
+        view: crate::PictureView { width: 9, height: 9, camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     assert_eq!(backend.draw(&frame).err(), Some(DrawError::NotResident { id }), "a missing brick");
 }

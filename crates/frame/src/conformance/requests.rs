@@ -4,8 +4,8 @@ use glam::DVec3;
 use volery_scene::Camera;
 
 use crate::{
-    Backend, Brick, BrickId, Content, DrawError, Frame, Image, PlacedBrick, Rays, TexelType, Texels,
-    UploadError,
+    Backend, Brick, BrickId, Content, DrawError, Frame, Image, PictureView, PlacedBrick, Rays, TexelType,
+    Texels, UploadError,
 };
 
 use super::oracle::{assert_background, assert_close, assert_same_bits, march_volume};
@@ -31,7 +31,10 @@ fn draw_placed(
 ) -> Result<Image, DrawError> {
     let transfer = &volume.integrated(&smooth_transfer(1.0));
     let content = Content::Rays(Rays { transfer, bricks });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
+    let frame = Frame {
+        view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     backend.draw(&frame).map(|drawn| drawn.image)
 }
 

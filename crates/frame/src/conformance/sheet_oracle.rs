@@ -4,8 +4,8 @@ use glam::DVec3;
 use volery_scene::{Camera, Projection, Ray};
 
 use crate::{
-    Backend, Content, DrawError, Frame, Image, Light, Quantization, Sheet, SheetTransfer, SheetVertices,
-    Sheets,
+    Backend, Content, Counted, DrawError, Frame, Image, Light, PictureView, Quantization, Revision, Sheet,
+    SheetTransfer, SheetVertices, Sheets,
 };
 
 use super::cubes::Random;
@@ -100,9 +100,9 @@ impl Scene {
 
     /// Adds triangles as one sheet at a place along the normal.
     pub(super) fn add(&mut self, position: f64, thickness: [f32; 2], triangles: &[[u32; 3]]) {
-        let first = self.triangles.len() as u32;
+        let (first, count) = (self.triangles.len() as u32, triangles.len() as u32);
         self.triangles.extend(triangles);
-        self.sheets.push((position, Sheet { first, count: triangles.len() as u32, thickness }));
+        self.sheets.push((position, Sheet { first, count, thickness, counted: Counted::All }));
     }
 
     /// Adds a square of `2 half` by `2 half` around `middle` (from the origin), cut into `cells` by `cells` crooked
@@ -181,6 +181,11 @@ impl Scene {
         for sheet in sheets {
             for &triangle in &self.triangles[sheet.first as usize..][..sheet.count as usize] {
                 let Some(weights) = self.weights(ray, triangle) else { continue };
+                let [a, b, c] = triangle.map(|vertex| self.place(vertex));
+                let is_leaving = (b - a).cross(c - a).dot(ray.direction) > 0.0;
+                if !sheet.counted.counts(is_leaving, self.normal.dot(ray.direction) > 0.0) {
+                    continue;
+                }
                 let mean = |of: &dyn Fn(usize) -> f64| {
                     (0..3).map(|i| weights[i] * of(triangle[i] as usize)).sum::<f64>()
                 };
@@ -228,7 +233,7 @@ impl Scene {
     pub(super) fn try_draw(
         &self,
         backend: &mut dyn Backend,
-        revision: u64,
+        revision: Option<Revision>,
         vertices: SheetVertices<'_>,
         camera: &Camera,
         [width, height]: [u32; 2],
@@ -245,12 +250,15 @@ impl Scene {
             transfer: &transfer,
             light: self.light,
         });
-        let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
+        let frame = Frame {
+            view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
+            content,
+        };
         backend.draw(&frame).map(|drawn| drawn.image)
     }
 
     pub(super) fn draw(&self, backend: &mut dyn Backend, camera: &Camera, size: [u32; 2]) -> Image {
-        self.try_draw(backend, 0, self.exact(), camera, size).expect("right sheets")
+        self.try_draw(backend, None, self.exact(), camera, size).expect("right sheets")
     }
 
     /// The scene with its vertices rounded to few bits, and these.

@@ -8,7 +8,8 @@ use glam::DVec3;
 use volery_scene::{Camera, Projection, Ray, TransferFunction};
 
 use crate::{
-    Backend, Content, DrawError, Frame, Image, Light, Sheet, SheetTransfer, SheetVertices, Sheets, TexelType,
+    Backend, Content, DrawError, Frame, Image, Light, PictureView, Revision, Sheet, SheetTransfer,
+    SheetVertices, Sheets, TexelType,
 };
 
 use super::STOP_TRANSMITTANCE;
@@ -134,10 +135,13 @@ fn draw_sheets(
 ) -> Image {
     let Scene { normal, origin, light, .. } = *scene;
     let triangles = &scene.triangles;
-    let sheets = Sheets { revision: 0, normal, origin, vertices, triangles, sheets, transfer, light };
+    let sheets = Sheets { revision: None, normal, origin, vertices, triangles, sheets, transfer, light };
     let content = Content::Sheets(sheets);
     let [width, height] = SIZE;
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
+    let frame = Frame {
+        view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     backend.draw(&frame).expect("right sheets").image
 }
 
@@ -473,7 +477,7 @@ pub fn quantized_vertices_are_what_their_numbers_say(backend: &mut dyn Backend) 
         let (rounded, (points, gradients, quantization)) = scene.quantized();
         let vertices = SheetVertices::Quantized { points: &points, gradients: &gradients, quantization };
         for (what, camera) in cameras() {
-            let image = rounded.try_draw(backend, 0, vertices, &camera, SIZE).expect("right sheets");
+            let image = rounded.try_draw(backend, None, vertices, &camera, SIZE).expect("right sheets");
             rounded.compare(&format!("quantized, {what}"), &image, &camera, 3.0 * MAX);
         }
     }
@@ -509,7 +513,7 @@ pub fn sheets_that_show_nothing(backend: &mut dyn Backend) {
 pub fn wrong_sheets_are_named(backend: &mut dyn Backend) {
     let camera = cameras()[0].1;
     let full = with_gradients(stack(DVec3::Z, 4, 3, Table::ramp(1.0), 15));
-    let mut refused = |scene: &Scene| match scene.try_draw(backend, 0, scene.exact(), &camera, SIZE) {
+    let mut refused = |scene: &Scene| match scene.try_draw(backend, None, scene.exact(), &camera, SIZE) {
         Err(DrawError::Sheets { what, found, expected }) => {
             println!("{what} of sheets is {found}, expected {expected}");
             Some(what)
@@ -534,25 +538,24 @@ pub fn wrong_sheets_are_named(backend: &mut dyn Backend) {
     }
 }
 
-/// The same revision shows the same bits whatever else changes between; another one shows other contents, and 0 is
-/// never kept.
+/// The same revision shows the same bits whatever else changes between; another one shows other contents, and what has
+/// none is never kept.
 pub fn revisions_name_contents(backend: &mut dyn Backend) {
     let camera = cameras()[0].1;
     let one = with_gradients(stack(DVec3::Z, 6, 5, Table::ramp(1.0), 16));
     let other = with_gradients(stack(DVec3::X, 9, 3, Table::ramp(2.0), 17));
-    let mut show = |scene: &Scene, revision: u64, camera: &Camera| {
+    let mut show = |scene: &Scene, revision: Option<Revision>, camera: &Camera| {
         scene.try_draw(backend, revision, scene.exact(), camera, SIZE).expect("right sheets")
     };
-    let plain = [&one, &other].map(|scene| show(scene, 0, &camera));
+    let plain = [&one, &other].map(|scene| show(scene, None, &camera));
     assert_ne!(plain[0], plain[1], "two scenes");
-    let [first, second] = [Sheets::next_revision(), Sheets::next_revision()];
-    assert!(first != 0 && second != 0 && first != second, "revisions {first} and {second}");
+    let [first, second] = [Some(Revision::new()), Some(Revision::new())];
     for round in 0..2 {
         assert_same_bits(&format!("first, {round}"), &show(&one, first, &camera), &plain[0]);
         assert_same_bits(&format!("first again, {round}"), &show(&one, first, &camera), &plain[0]);
         assert_same_bits(&format!("second, {round}"), &show(&other, second, &camera), &plain[1]);
-        assert_same_bits(&format!("none, {round}"), &show(&one, 0, &camera), &plain[0]);
-        assert_same_bits(&format!("none, other, {round}"), &show(&other, 0, &camera), &plain[1]);
+        assert_same_bits(&format!("none, {round}"), &show(&one, None, &camera), &plain[0]);
+        assert_same_bits(&format!("none, other, {round}"), &show(&other, None, &camera), &plain[1]);
     }
     // Only vertices and triangles belong to a revision.
     let mut changed = Scene { table: Table::ramp(0.3), ..one.clone() };
@@ -560,7 +563,7 @@ pub fn revisions_name_contents(backend: &mut dyn Backend) {
     changed.sheets.truncate(4);
     changed.sheets.iter_mut().for_each(|(_, sheet)| sheet.thickness = [0.7, 0.01]);
     for (what, camera) in cameras() {
-        let expected = show(&changed, 0, &camera);
+        let expected = show(&changed, None, &camera);
         show(&one, first, &camera);
         assert_same_bits(&format!("other sheets, {what}"), &show(&changed, first, &camera), &expected);
     }

@@ -8,8 +8,8 @@ use volery_scene::mesh::shade;
 use volery_scene::{Camera, Plane, Projection, Ray, TransferFunction, TriangleMesh};
 
 use crate::{
-    Backend, BlendedBrick, Content, Cube, Cubes, Frame, Image, PlacedBrick, Planes, PointTransfer, Rays,
-    Sampling, Sheet, SheetTransfer, SheetVertices, Sheets, TexelType, Thickness,
+    Backend, BlendedBrick, Content, Counted, Cube, Cubes, Frame, Image, PictureView, PlacedBrick, Planes,
+    PointTransfer, Rays, Sampling, Sheet, SheetTransfer, SheetVertices, Sheets, TexelType, Thickness,
 };
 
 use super::STOP_TRANSMITTANCE;
@@ -109,7 +109,10 @@ fn draw(
     content: Content<'_>,
 ) -> Image {
     assert!(camera.defects().is_empty(), "the suite's camera: {:?}", camera.defects());
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes, content };
+    let frame = Frame {
+        view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes },
+        content,
+    };
     backend.draw(&frame).expect("the suite's frames are right").image
 }
 
@@ -301,8 +304,13 @@ pub fn surfaces_cut_cubes(backend: &mut dyn Backend) {
             if thickness == Thickness::Interpolated && name != "orthographic" {
                 continue;
             }
-            let image =
-                draw(backend, &camera, &meshes, SIZE, Content::Cubes(Cubes { cubes: &cubes, thickness }));
+            let image = draw(
+                backend,
+                &camera,
+                &meshes,
+                SIZE,
+                Content::Cubes(Cubes { revision: None, cubes: &cubes, thickness }),
+            );
             let light = |ray: &Ray| {
                 let end = end_of(ray, &meshes);
                 let chord_of = |cube: &Cube| {
@@ -382,11 +390,15 @@ pub fn surfaces_cut_sheets(backend: &mut dyn Backend) {
         let numbers: Vec<[u32; 3]> = (0..slabs.len() as u32)
             .flat_map(|i| [[0, 1, 2], [0, 2, 3]].map(|triangle| triangle.map(|corner| 4 * i + corner)))
             .collect();
-        let sheet =
-            |(place, slab): (u32, &Slab)| Sheet { first: 2 * place, count: 2, thickness: slab.thickness };
+        let sheet = |(place, slab): (u32, &Slab)| Sheet {
+            first: 2 * place,
+            count: 2,
+            thickness: slab.thickness,
+            counted: Counted::All,
+        };
         let sheets: Vec<Sheet> = (0..).zip(&slabs).map(sheet).collect();
         let content = Content::Sheets(Sheets {
-            revision: 0,
+            revision: None,
             normal: DVec3::Z,
             origin: DVec3::ZERO,
             vertices: SheetVertices::Exact { points: &points, gradients: &[] },

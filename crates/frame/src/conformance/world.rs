@@ -4,8 +4,8 @@ use glam::{DVec3, UVec3};
 use volery_scene::{Camera, ControlPoint, Projection, TransferFunction};
 
 use crate::{
-    Backend, Brick, BrickId, Content, Frame, Image, PlacedBrick, RayTransfer, Rays, Revision, TexelType,
-    Texels, VolumeLayout,
+    Backend, Brick, BrickId, Content, Frame, Image, PictureView, PlacedBrick, RayTransfer, Rays, Revision,
+    TexelType, Texels, VolumeLayout,
 };
 
 pub(super) const BACKGROUND: [f32; 3] = [0.125, 0.25, 0.5];
@@ -252,7 +252,10 @@ pub(super) fn draw_resident(
     let placed: Vec<_> = bricks.iter().map(|brick| brick.placed).collect();
     let transfer = &volume.integrated(transfer);
     let content = Content::Rays(Rays { transfer, bricks: &placed });
-    let frame = Frame { width, height, camera: *camera, background: BACKGROUND, meshes: &[], content };
+    let frame = Frame {
+        view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
+        content,
+    };
     let drawn = backend.draw(&frame).expect("every brick is resident and in its place");
     assert_eq!((drawn.image.width, drawn.image.height), (width, height), "size of the picture");
     assert!(drawn.device_seconds.is_none_or(|s| s >= 0.0 && s.is_finite()), "{:?}", drawn.device_seconds);

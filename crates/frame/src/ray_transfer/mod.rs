@@ -32,7 +32,7 @@
 mod bins;
 mod segments;
 
-use volery_scene::TransferFunction;
+use volery_scene::{Revision, TransferFunction};
 
 use crate::{TexelType, VolumeLayout};
 pub use bins::BinSet;
@@ -88,8 +88,9 @@ pub struct Band {
 }
 
 /// A transfer function for rays through one volume.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct RayTransfer {
+    revision: Revision,
     texel_origin: f64,
     bands: Vec<Band>,
     entries: Vec<[f32; 4]>,
@@ -192,6 +193,7 @@ impl RayTransfer {
         let rise = |bin: usize| Bin::variation(&bins[bin..=bin]);
         let slope = (0..bins.len()).filter(is_easy).map(rise).fold(0.0, f64::max) / bin_width;
         Self {
+            revision: Revision::new(),
             texel_origin,
             bands: segments.iter().map(|segment| band(segment, texel_origin)).collect(),
             entries: sum_up(&bins),
@@ -202,6 +204,11 @@ impl RayTransfer {
             unit_length,
             depth_scale,
         }
+    }
+
+    /// Names the table, which never changes; that of clones is the same.
+    pub fn revision(&self) -> Revision {
+        self.revision
     }
 
     /// The texel that texels are counted from; `f32` holds it, and it is whole where texels are.

@@ -16,8 +16,8 @@ use rayon::prelude::*;
 use volery_frame::{Cube, VolumeLayout};
 
 use super::view::View;
-use super::{PACKET, TILE, TILE_PACKETS};
 use crate::math::axes;
+use crate::target::{PACKET, TILE, TILE_PACKETS};
 
 /// A chunk has at least so many cubes, and at least as many as there are tiles, so that lists of empty tiles do not
 /// outweigh the cubes.

@@ -8,7 +8,7 @@ use volery_cubefan::{Cuboid, Fans, Viewpoint};
 
 use super::bins::Entry;
 use super::view::View;
-use super::{NUM_PACKETS, PACKET, TILE, TILE_PACKETS};
+use crate::target::{NUM_PACKETS, PACKET, TILE_PACKETS};
 
 /// Steps of vertices per pixel.
 const STEPS: i64 = 4096;
@@ -37,14 +37,14 @@ struct Vertex {
 type Window = [[i64; 2]; 2];
 
 impl<'a> Raster<'a> {
-    pub(super) fn new(view: &'a View, tile: [u32; 2]) -> Self {
+    /// For the tile that begins at this pixel.
+    pub(super) fn new(view: &'a View, first: [u32; 2]) -> Self {
         let viewpoint = if view.is_perspective {
             Viewpoint::Eye(view.eye.to_array())
         } else {
             Viewpoint::Direction(view.forward.to_array())
         };
-        let first = tile.map(|place| i64::from(place * TILE));
-        Self { view, first, viewpoint, lengths: vec![[0.0; 16]; NUM_PACKETS] }
+        Self { view, first: first.map(i64::from), viewpoint, lengths: vec![[0.0; 16]; NUM_PACKETS] }
     }
 
     /// Lengths in unit lengths, meaningful in the packets of the entry; none where slabs must do.

@@ -4,11 +4,11 @@
 //! of f32.
 
 use glam::{DVec3, IVec3};
-use volery_frame::{Frame, VolumeLayout};
+use volery_frame::{PictureView, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
-use super::PACKET;
 use crate::surfaces::Surfaces;
+use crate::target::PACKET;
 
 /// Steps of rays that all but stand still along an axis are this long, so that their inverse exists.
 const LEAST_STEP: f64 = 1e-30;
@@ -43,10 +43,10 @@ pub(super) struct PacketRays {
 }
 
 impl View {
-    pub(super) fn new(frame: &Frame<'_>, layout: &VolumeLayout) -> Self {
+    pub(super) fn new(picture: &PictureView<'_>, layout: &VolumeLayout) -> Self {
         let unit_length = layout.spacing.min_element();
-        let rays = frame.camera.rays(frame.width, frame.height);
-        let is_perspective = matches!(frame.camera.projection, Projection::Perspective { .. });
+        let rays = picture.camera.rays(picture.width, picture.height);
+        let is_perspective = matches!(picture.camera.projection, Projection::Perspective { .. });
         let scale = unit_length.recip();
         let (right, down) = if is_perspective {
             (rays.toward_dx, rays.toward_dy)
@@ -65,10 +65,10 @@ impl View {
             step: layout.spacing * (0.5 * scale),
             domain: 2.0 * DVec3::from_array(layout.cells.map(f64::from)),
             is_perspective,
-            eye: frame.camera.eye * scale,
-            forward: frame.camera.axes()[2],
+            eye: picture.camera.eye * scale,
+            forward: picture.camera.axes()[2],
             pixels_per_length: [right, down].map(|pixel| pixel / pixel.length_squared()),
-            size: [frame.width, frame.height],
+            size: [picture.width, picture.height],
         }
     }
 

@@ -9,12 +9,12 @@
 
 use fearless_simd::{Level, dispatch, prelude::*};
 use rayon::prelude::*;
-use volery_frame::Sheet;
+use volery_frame::{Counted, Sheet};
 
 use super::Scene;
 use super::view::Vertex;
 use crate::math::axes;
-use crate::tile::TILE;
+use crate::target::TILE;
 
 /// A chunk has at least so many triangles unless it is the last, and at least as many as there are tiles, so that lists
 /// of empty tiles do not outweigh the triangles.
@@ -117,6 +117,7 @@ struct Footprint {
 fn footprints(scene: &Scene<'_>, pieces: &[Piece]) -> Vec<Footprint> {
     let mut footprints = Vec::with_capacity(pieces.iter().map(|piece| piece.count as usize).sum());
     for piece in pieces {
+        let counted = scene.content.sheets[piece.sheet as usize].counted;
         for triangle in (piece.first..piece.first + piece.count).rev() {
             let numbers = &scene.content.triangles[triangle as usize];
             let vertices = axes(
@@ -132,6 +133,9 @@ fn footprints(scene: &Scene<'_>, pieces: &[Piece]) -> Vec<Footprint> {
             let Some([first, last]) = bounds else { continue };
             let values = [vertices[0].value, vertices[1].value, vertices[2].value];
             if scene.table.is_clear(values, || scene.magnitudes(*numbers)) {
+                continue;
+            }
+            if counted != Counted::All && !scene.view.counts(counted, scene.corners(*numbers)) {
                 continue;
             }
             footprints.push(Footprint { triangle, sheet: piece.sheet, first, last });

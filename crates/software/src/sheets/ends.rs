@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::raster::{Fragments, STRIP, THICKNESS};
 use super::view::View;
 use crate::surfaces::Surfaces;
-use crate::tile::TILE;
+use crate::target::TILE;
 
 /// A triangle of a sheet, as it lies in space.
 pub(super) struct Placed {

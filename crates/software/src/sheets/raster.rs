@@ -15,7 +15,7 @@ use fearless_simd::{f32x16, i32x16, prelude::*};
 
 use super::view::Vertex;
 use crate::math::axes;
-use crate::tile::TILE;
+use crate::target::TILE;
 
 /// Fragments that are shaded together.
 const BATCH: usize = 512;

@@ -8,9 +8,7 @@ use super::NUM_PIXELS;
 use super::raster::{Fragments, ROOM, STRIP};
 use super::table::Table;
 use crate::math::opacity_of_depth;
-
-/// Red, green, blue and transmittance of the pixels of a tile.
-pub(super) type Pixels = [[f32; 4]; NUM_PIXELS];
+use crate::target::Rows;
 
 /// A direction whose square is below this has no shade.
 const MIN_SQUARE: f32 = 1e-20;
@@ -37,7 +35,7 @@ impl Shading<'_> {
         &self,
         simd: S,
         fragments: &mut Fragments<N>,
-        pixels: &mut Pixels,
+        pixels: &mut Rows,
     ) {
         let mut entries = Entries { colors: [[0.0; 4]; 16], extinctions: [0.0; 16] };
         for start in (0..fragments.len).step_by(16).take_while(|start| start + 16 <= ROOM) {

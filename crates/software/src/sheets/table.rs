@@ -3,6 +3,7 @@
 use volery_frame::SheetTransfer;
 
 /// Colours and extinctions, at least two columns.
+#[derive(Debug)]
 pub(super) struct Table {
     /// `[r, g, b, -1]`: times opacity and transmittance it is what a fragment adds to light and transmittance.
     pub(super) colors: Vec<[f32; 4]>,

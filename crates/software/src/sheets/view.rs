@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch, prelude::*};
 use glam::DVec3;
 use rayon::prelude::*;
-use volery_frame::{Frame, Sheets};
+use volery_frame::{Counted, PictureView, Sheets};
 use volery_scene::{Projection, RayGrid};
 
 /// Vertices that a thread projects at a time.
@@ -31,6 +31,8 @@ pub(super) struct View {
     forward: DVec3,
     /// Of the sheets.
     origin: DVec3,
+    /// From the origin.
+    eye: DVec3,
     depth_of_origin: f64,
     normal: DVec3,
     pub(super) is_perspective: bool,
@@ -41,16 +43,16 @@ pub(super) struct View {
 const MAX_OBLIQUITY: f64 = 1e8;
 
 impl View {
-    pub(super) fn new(frame: &Frame<'_>, content: &Sheets<'_>, points: &[[f32; 4]]) -> Self {
-        let rays = frame.camera.rays(frame.width, frame.height);
-        let is_perspective = matches!(frame.camera.projection, Projection::Perspective { .. });
+    pub(super) fn new(picture: &PictureView<'_>, content: &Sheets<'_>, points: &[[f32; 4]]) -> Self {
+        let rays = picture.camera.rays(picture.width, picture.height);
+        let is_perspective = matches!(picture.camera.projection, Projection::Perspective { .. });
         let (right, down) =
             if is_perspective { (rays.toward_dx, rays.toward_dy) } else { (rays.origin_dx, rays.origin_dy) };
-        let forward = frame.camera.axes()[2];
-        let size = [frame.width, frame.height];
+        let forward = picture.camera.axes()[2];
+        let size = [picture.width, picture.height];
         let middle = size.map(|n| 0.5 * f64::from(n) - 0.5);
         let [right, down] = [right, down].map(|pixel| pixel / pixel.length_squared());
-        let origin = content.origin - frame.camera.eye;
+        let origin = content.origin - picture.camera.eye;
         let (rows, constants) = if is_perspective {
             let reach = origin.length() + 2.0 * largest(points);
             let rows = [right + forward * middle[0], down + forward * middle[1], forward];
@@ -60,9 +62,8 @@ impl View {
             ([right, down, DVec3::ZERO], [right.dot(origin) + middle[0], down.dot(origin) + middle[1], 1.0])
         };
         let depth_of_origin = forward.dot(origin);
-        let normal = content.normal;
-        let origin = content.origin;
-        Self { rays, rows, constants, forward, origin, depth_of_origin, normal, is_perspective, size }
+        let (normal, origin, eye) = (content.normal, content.origin, picture.camera.eye - content.origin);
+        Self { eye, rays, rows, constants, forward, origin, depth_of_origin, normal, is_perspective, size }
     }
 
     /// The vertices, in their order.
@@ -99,6 +100,18 @@ impl View {
         let (x, y) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
         let toward = self.rays.toward + self.rays.toward_dx * x + self.rays.toward_dy * y;
         (toward.length() / self.normal.dot(toward).abs()).min(MAX_OBLIQUITY) as f32
+    }
+
+    /// Whether a triangle, whose corners are relative to the origin of the sheets, counts for the rays that meet it.
+    pub(super) fn counts(&self, counted: Counted, [a, b, c]: [DVec3; 3]) -> bool {
+        let outward = (b - a).cross(c - a);
+        let (to_plane, to_middle) = if self.is_perspective {
+            let from_eye = a - self.eye;
+            (from_eye, from_eye + ((b - a) + (c - a)) / 3.0)
+        } else {
+            (self.forward, self.forward)
+        };
+        counted.counts(outward.dot(to_plane) > 0.0, self.normal.dot(to_middle) > 0.0)
     }
 
     /// How deep the ray of a pixel meets a triangle, whose corners are relative to the origin of the sheets, and the

@@ -62,7 +62,7 @@ pub trait Technique<D>: Send {
 }
 
 /// What one picture draws.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Plan {
     /// What the backend is asked for.
     pub drawing: Drawing,
@@ -92,7 +92,7 @@ pub struct Work {
 }
 
 /// A [`Content`] that owns what it shows.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum Drawing {
     /// Matter along rays.
     Rays {
@@ -151,7 +151,9 @@ impl Drawing {
                     shows_bricks: *shows_bricks,
                 })
             }
-            Self::Cubes { cubes, thickness } => Content::Cubes(Cubes { cubes, thickness: *thickness }),
+            Self::Cubes { cubes, thickness } => {
+                Content::Cubes(Cubes { revision: None, cubes, thickness: *thickness })
+            }
             Self::Sheets { stack, sheets, transfer, light } => {
                 Content::Sheets(stack.content(sheets, transfer, *light))
             }

@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use volery_frame::{Light, Quantization, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{Counted, Light, Quantization, Revision, Sheet, SheetTransfer, SheetVertices, Sheets};
 use volery_reference::GridTracer;
 use volery_scene::{Camera, Projection, Samples};
 use volery_slicing::{MeshSheet, QuantizedMesh, Rays, SliceMesh, error};
@@ -238,7 +238,7 @@ fn plan(stack: &mut Arc<Stack>, table: &mut Table, view: &View, range: [f64; 2])
 }
 
 /// Slices with strips in order for some rays.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Stack {
     mesh: SliceMesh,
     /// What is drawn in place of the mesh's own vertices.
@@ -248,16 +248,16 @@ pub struct Stack {
     /// The rays that its strips are in order for.
     rays: Rays,
     /// Names the contents of the mesh.
-    revision: u64,
+    revision: Revision,
     /// The revision that was drawn last.
-    sent: Option<u64>,
+    sent: Option<Revision>,
 }
 
 impl Stack {
     /// Of a mesh whose strips are in order for rays along its normal.
     pub(crate) fn new(mesh: SliceMesh, quantized: Option<QuantizedMesh>) -> Self {
         let unordered = (mesh.triangles.clone(), mesh.sheets.clone());
-        let (rays, revision) = (Rays::Along(mesh.normal), Sheets::next_revision());
+        let (rays, revision) = (Rays::Along(mesh.normal), Revision::new());
         Self { mesh, quantized, unordered, rays, revision, sent: None }
     }
 
@@ -290,7 +290,7 @@ impl Stack {
         if self.quantized.is_some() {
             self.quantized = Some(QuantizedMesh::new(&self.mesh)?);
         }
-        self.revision = Sheets::next_revision();
+        self.revision = Revision::new();
         Ok(())
     }
 
@@ -304,7 +304,7 @@ impl Stack {
             self.mesh.triangles.copy_from_slice(&self.unordered.0);
             self.mesh.sheets.clone_from(&self.unordered.1);
             self.mesh.orient_strips(rays);
-            (self.rays, self.revision) = (rays, Sheets::next_revision());
+            (self.rays, self.revision) = (rays, Revision::new());
         }
     }
 
@@ -317,7 +317,7 @@ impl Stack {
     ) -> Sheets<'a> {
         let SliceMesh { normal, origin, points, gradients, triangles, .. } = &self.mesh;
         Sheets {
-            revision: self.revision,
+            revision: Some(self.revision),
             normal: *normal,
             origin: *origin,
             vertices: match &self.quantized {
@@ -342,6 +342,7 @@ impl Stack {
             first: sheet.triangles.start,
             count: sheet.triangles.end - sheet.triangles.start,
             thickness: sheet.thickness.map(|part| part as f32),
+            counted: Counted::All,
         };
         self.mesh.back_to_front(eye).map(sheet).collect()
     }

@@ -1,9 +1,9 @@
 //! Vertices and triangles on the device, under the name of their revision.
 
-use volery_frame::{SheetVertices, Sheets};
+use volery_frame::{Revision, SheetVertices, Sheets};
 
 use super::chunks::{Most, chunks};
-use crate::gpu::{Failure, Gpu};
+use crate::gpu::{Failure, Gpu, Upload};
 
 /// Most vertices and triangles of a part: 32 MiB of floats, and 48 MiB.
 const MOST: Most = Most { vertices: 1 << 21, triangles: 1 << 22 };
@@ -17,7 +17,7 @@ pub(crate) struct Store(Vec<Held>);
 
 /// What was made of a revision.
 pub(crate) struct Held {
-    revision: u64,
+    revision: Option<Revision>,
     pub(crate) parts: Vec<Part>,
 }
 
@@ -33,12 +33,12 @@ pub(crate) struct Part {
 impl Store {
     /// What the content's revision is on the device: what is there already, else what is uploaded now.
     pub(crate) fn hold(&mut self, gpu: &Gpu, content: &Sheets<'_>) -> Result<&Held, Failure> {
-        let is_held = |held: &Held| held.revision == content.revision && content.revision != 0;
+        let is_held = |held: &Held| held.revision == content.revision && content.revision.is_some();
         let held = match self.0.iter().position(is_held) {
             Some(place) => self.0.remove(place),
             None => {
                 self.forget_nameless();
-                if content.revision != 0 {
+                if content.revision.is_some() {
                     self.0.drain(..(self.0.len() + 1).saturating_sub(NUM_KEPT));
                 }
                 match gpu.checked(|| Held::new(gpu, content)) {
@@ -57,7 +57,7 @@ impl Store {
 
     /// Lets go of what will not be asked for again.
     pub(crate) fn forget_nameless(&mut self) {
-        self.0.retain(|held| held.revision != 0);
+        self.0.retain(|held| held.revision.is_some());
     }
 }
 
@@ -90,10 +90,16 @@ fn parts<P: bytemuck::Pod, G: bytemuck::Pod>(
         let storage = wgpu::BufferUsages::STORAGE;
         Part {
             triangles: range,
-            points: uploaded(gpu, "volery sheet points", points, storage),
+            points: uploaded(gpu, Upload::Geometry, "volery sheet points", points, storage),
             gradients: (!gradients.is_empty())
-                .then(|| uploaded(gpu, "volery sheet gradients", gradients, storage)),
-            indices: uploaded(gpu, "volery sheet triangles", corners, wgpu::BufferUsages::INDEX),
+                .then(|| uploaded(gpu, Upload::Geometry, "volery sheet gradients", gradients, storage)),
+            indices: uploaded(
+                gpu,
+                Upload::Geometry,
+                "volery sheet triangles",
+                corners,
+                wgpu::BufferUsages::INDEX,
+            ),
         }
     };
     if points.len() <= most.vertices && triangles.len() <= most.triangles {
@@ -112,6 +118,7 @@ fn parts<P: bytemuck::Pod, G: bytemuck::Pod>(
 /// A buffer with contents; a device without memory for it reports that, and nobody panics.
 pub(crate) fn uploaded<T: bytemuck::Pod>(
     gpu: &Gpu,
+    kind: Upload,
     label: &str,
     contents: &[T],
     usage: wgpu::BufferUsages,
@@ -123,6 +130,7 @@ pub(crate) fn uploaded<T: bytemuck::Pod>(
         usage: usage | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
+    gpu.count(kind, contents.len());
     gpu.queue.write_buffer(&uploaded, 0, contents);
     uploaded
 }

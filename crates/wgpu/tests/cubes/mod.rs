@@ -2,7 +2,7 @@
 
 use volery_frame::conformance::Property;
 use volery_frame::{
-    Backend, Content, Cube, Cubes, Frame, Image, Revision, TexelType, Thickness, VolumeLayout,
+    Backend, Content, Cube, Cubes, Frame, Image, PictureView, Revision, TexelType, Thickness, VolumeLayout,
 };
 use volery_scene::{Camera, Projection};
 
@@ -34,8 +34,9 @@ fn draw(
         value_range: [0.0, 255.0],
     };
     backend.set_volume(&layout).expect("no brick is needed");
-    let content = Content::Cubes(Cubes { cubes, thickness: Thickness::Exact });
-    let frame = Frame { width, height, camera, background: [0.25; 3], meshes: &[], content };
+    let content = Content::Cubes(Cubes { revision: None, cubes, thickness: Thickness::Exact });
+    let frame =
+        Frame { view: PictureView { width, height, camera, background: [0.25; 3], meshes: &[] }, content };
     backend.draw(&frame).expect("cubes need no brick").image
 }
 

@@ -2,7 +2,10 @@
 
 use glam::DVec3;
 use volery_frame::conformance::Property;
-use volery_frame::{Backend, Content, Frame, Image, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{
+    Backend, Content, Counted, Frame, Image, PictureView, Revision, Sheet, SheetTransfer, SheetVertices,
+    Sheets,
+};
 use volery_scene::{Camera, Projection};
 
 use super::difference;
@@ -45,13 +48,18 @@ impl Scene {
             [[a, b, c], [d, c, b]]
         }));
         let count = self.triangles.len() as u32 - first_triangle;
-        self.sheets.push(Sheet { first: first_triangle, count, thickness: [thickness, 0.0] });
+        self.sheets.push(Sheet {
+            first: first_triangle,
+            count,
+            thickness: [thickness, 0.0],
+            counted: Counted::All,
+        });
     }
 
     fn draw(
         &self,
         backend: &mut dyn Backend,
-        revision: u64,
+        revision: Option<Revision>,
         sheets: &[Sheet],
         camera: Camera,
         [width, height]: [u32; 2],
@@ -66,7 +74,10 @@ impl Scene {
             transfer: &transfer(),
             light: None,
         });
-        let frame = Frame { width, height, camera, background: [0.25; 3], meshes: &[], content };
+        let frame = Frame {
+            view: PictureView { width, height, camera, background: [0.25; 3], meshes: &[] },
+            content,
+        };
         backend.draw(&frame).expect("right sheets").image
     }
 }
@@ -94,8 +105,8 @@ fn a_revision_stays_on_the_device(backend: &mut dyn Backend) {
     let camera = from_above(Projection::Orthographic { height: 1.0 });
     let scenes = [0.0, 0.25, 0.5, 0.75, 1.0].map(|value| Scene::square(0.0, 2.0, value));
     let mut shown = |scene: &Scene, revision| scene.draw(backend, revision, &scene.sheets, camera, [4, 3]);
-    let plain = scenes.each_ref().map(|scene| shown(scene, 0));
-    let revisions = [(); 5].map(|()| Sheets::next_revision());
+    let plain = scenes.each_ref().map(|scene| shown(scene, None));
+    let revisions = [(); 5].map(|()| Some(Revision::new()));
     for number in 0..4 {
         let image = shown(&scenes[number], revisions[number]);
         assert_eq!(image, plain[number], "revision {number}");
@@ -103,7 +114,7 @@ fn a_revision_stays_on_the_device(backend: &mut dyn Backend) {
     for number in [0, 3, 1, 2, 0] {
         let image = shown(&scenes[4], revisions[number]);
         assert_eq!(image, plain[number], "the last four are kept: {number}");
-        assert_eq!(shown(&scenes[4], 0), plain[4], "0 is never kept");
+        assert_eq!(shown(&scenes[4], None), plain[4], "what has none is never kept");
     }
     assert_eq!(shown(&scenes[4], revisions[4]), plain[4], "a fifth");
     assert_eq!(
@@ -124,6 +135,7 @@ fn sheets_of_several_buffers_are_drawn_in_order(backend: &mut dyn Backend) {
     (0..9).for_each(|i| scene.add(0.1 * i as f32, 300.0, CELLS, gray(i), thickness(i)));
     assert!(scene.points.len() > 1 << 21 && scene.triangles.len() > 1 << 22, "{}", scene.points.len());
     let camera = from_above(Projection::Orthographic { height: 0.5 });
+    let revision = Revision::new();
     for is_turned in [false, true] {
         let direction = if is_turned { -1.0 } else { 1.0 };
         let camera = Camera {
@@ -139,7 +151,7 @@ fn sheets_of_several_buffers_are_drawn_in_order(backend: &mut dyn Backend) {
             .iter()
             .fold(0.25, |behind, &(number, _)| over(gray(number).into(), thickness(number).into(), behind));
         let sheets: Vec<_> = sheets.into_iter().map(|(_, sheet)| *sheet).collect();
-        let image = scene.draw(backend, 1_u64 << 63, &sheets, camera, [9, 9]);
+        let image = scene.draw(backend, Some(revision), &sheets, camera, [9, 9]);
         let max = difference(&image, |_| expected);
         println!("several buffers: max {max:.2e} (threshold {MAX:e}) from {expected:.4}");
         assert!(max <= MAX, "several buffers: {max:e} from {expected}, expected at most {MAX:e}");
@@ -152,7 +164,7 @@ fn sheets_in_pictures_of_several_tiles_have_no_seam(backend: &mut dyn Backend) {
     for (size, fov_y_deg) in [([5000, 3], 0.04), ([3, 5000], 60.0)] {
         for target in [DVec3::ZERO, DVec3::new(4.0, 1.0, 0.0)] {
             let camera = Camera { target, ..from_above(Projection::Perspective { fov_y_deg }) };
-            let image = scene.draw(backend, 0, &scene.sheets, camera, size);
+            let image = scene.draw(backend, None, &scene.sheets, camera, size);
             let rays = camera.rays(size[0], size[1]);
             let expected = |place: usize| {
                 let ray = rays.pixel(place as u32 % size[0], place as u32 / size[0]);

@@ -11,7 +11,10 @@ use volery::{
     RenderError, SampleType, Session, Thickness, TransferFunction, View, ViewOptions, VolumeData,
     VolumeError, VoxelGrid, open_backend,
 };
-use volery_frame::{Brick, BrickId, DrawError, Drawn, Frame, Revision, UploadError, VolumeLayout};
+use volery_frame::{
+    Brick, BrickId, Content, DrawError, Drawn, FinishedPart, PictureView, Revision, UploadError,
+    UploadedBytes, VolumeLayout,
+};
 
 fn software() -> Box<dyn Backend> {
     open_backend(BackendChoice::Software).unwrap()
@@ -180,6 +183,7 @@ fn what_cannot_be_drawn_is_refused() {
 #[derive(Clone, Default)]
 struct Narrow {
     room: usize,
+    size: [u32; 2],
     volume: Option<Revision>,
     bricks: Arc<Mutex<HashMap<BrickId, usize>>>,
     largest_upload: Arc<Mutex<usize>>,
@@ -217,21 +221,40 @@ impl Backend for Narrow {
         Ok(())
     }
 
+    fn evict(&mut self, bricks: &[BrickId]) {
+        let mut held = self.bricks.lock().unwrap();
+        held.retain(|id, _| !bricks.contains(id));
+    }
+
     fn resident_bytes(&self) -> u64 {
         self.bricks.lock().unwrap().len() as u64
     }
 
-    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
+    fn uploaded_bytes(&self) -> UploadedBytes {
+        UploadedBytes::default()
+    }
+
+    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
+        self.size = [view.width, view.height];
+        Ok(())
+    }
+
+    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
         let bricks = self.bricks.lock().unwrap();
-        for brick in frame.content.bricks() {
+        for brick in content.bricks() {
             assert!(bricks.contains_key(&brick.id), "{brick:?} is not resident");
         }
-        let pixels = vec![[0.0; 3]; (frame.width * frame.height) as usize];
-        Ok(Drawn {
-            image: Image { width: frame.width, height: frame.height, pixels },
-            device_seconds: None,
-            ray_doubt: None,
-        })
+        Ok(0)
+    }
+
+    fn finished(&mut self) -> Vec<FinishedPart> {
+        vec![FinishedPart { number: 0, device_seconds: None }]
+    }
+
+    fn finish(&mut self) -> Result<Drawn, DrawError> {
+        let [width, height] = self.size;
+        let pixels = vec![[0.0; 3]; (width * height) as usize];
+        Ok(Drawn { image: Image { width, height, pixels }, device_seconds: None, ray_doubt: None })
     }
 }
 

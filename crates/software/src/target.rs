@@ -1,0 +1,225 @@
+//! A picture under way: what each pixel has gathered from the front, and what light is left.
+//!
+//! # Method
+//! A tile that shows nothing yet has no memory; the first part that may show in it gives it some. Whatever casts rays,
+//! crosses planes or sums cubes and sheets goes on from what is there, which f32 holds to the bit, so where a picture is
+//! cut into parts cannot be seen. Surfaces and the background come behind all parts, at the end.
+
+use fearless_simd::{Level, dispatch, prelude::*};
+use rayon::prelude::*;
+use volery_frame::{Image, PictureView, RayDoubt};
+
+use crate::surfaces::Surfaces;
+
+/// Pixels of a tile per axis.
+pub(crate) const TILE: u32 = 32;
+
+/// Pixels of a packet per axis; a lane is `column + 4 * row`.
+pub(crate) const PACKET: u32 = 4;
+
+/// Packets of a tile per axis: a tile's packets are the bits of a `u64`.
+pub(crate) const TILE_PACKETS: u32 = TILE / PACKET;
+
+pub(crate) const NUM_PACKETS: usize = (TILE_PACKETS * TILE_PACKETS) as usize;
+
+const NUM_PIXELS: usize = (TILE * TILE) as usize;
+
+/// Red, green, blue and transmittance of a packet's rays.
+pub(crate) type Light = [[f32; 16]; 4];
+
+/// The numbers of a [`RayDoubt`] of a packet's rays.
+pub(crate) type Doubt = [[f32; 16]; 2];
+
+/// Red, green, blue and transmittance of the pixels of a tile, row by row.
+pub(crate) type Rows = [[f32; 4]; NUM_PIXELS];
+
+/// A picture under way.
+#[derive(Debug)]
+pub(crate) struct Target {
+    /// Without meshes, which are in `surfaces`.
+    pub(crate) view: PictureView<'static>,
+    pub(crate) surfaces: Surfaces,
+    /// Row by row; whole even where they reach over the edge of the picture.
+    pub(crate) tiles: Vec<Tile>,
+    pub(crate) shown: Shown,
+}
+
+/// What the parts so far were.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Shown {
+    pub(crate) num_parts: u32,
+    pub(crate) has_rays: bool,
+    /// Of parts that are all sheets: see [`Sheets::emitted`](volery_frame::Sheets::emitted).
+    pub(crate) emitted: Option<[[f32; 3]; 2]>,
+    /// Whether the last part was planes, which are put before what is behind in one rounding.
+    pub(crate) is_planes: bool,
+}
+
+/// What the pixels of a tile have gathered; none where nothing was.
+#[derive(Debug, Default)]
+pub(crate) struct Tile {
+    light: Option<Box<[Light; NUM_PACKETS]>>,
+    doubts: Option<Box<[Doubt; NUM_PACKETS]>>,
+}
+
+impl Tile {
+    /// Packets row by row.
+    #[inline]
+    pub(crate) fn light(&mut self) -> &mut [Light; NUM_PACKETS] {
+        self.light
+            .get_or_insert_with(|| Box::new([[[0.0; 16], [0.0; 16], [0.0; 16], [1.0; 16]]; NUM_PACKETS]))
+    }
+
+    #[inline]
+    pub(crate) fn light_and_doubts(&mut self) -> (&mut [Light; NUM_PACKETS], &mut [Doubt; NUM_PACKETS]) {
+        self.light();
+        let Self { light, doubts } = self;
+        let light = light.get_or_insert_with(|| Box::new([[[0.0; 16]; 4]; NUM_PACKETS]));
+        (light, doubts.get_or_insert_with(|| Box::new([[[0.0; 16]; 2]; NUM_PACKETS])))
+    }
+
+    /// The pixels row by row.
+    #[inline(always)]
+    pub(crate) fn rows(&self) -> Rows {
+        let mut rows = [[0.0, 0.0, 0.0, 1.0]; NUM_PIXELS];
+        for (packet, light) in (0..).zip(self.light.iter().flat_map(|light| light.iter())) {
+            for lane in 0..16 {
+                rows[place(packet, lane)] = [0, 1, 2, 3].map(|i| light[i][lane as usize]);
+            }
+        }
+        rows
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_rows(&mut self, rows: &Rows) {
+        for (packet, light) in (0..).zip(self.light()) {
+            for lane in 0..16 {
+                let pixel = rows[place(packet, lane)];
+                (0..4).for_each(|i| light[i][lane as usize] = pixel[i]);
+            }
+        }
+    }
+
+    fn worst_doubt(&self) -> RayDoubt {
+        let worst = |number: usize| {
+            let packets = self.doubts.iter().flat_map(|doubts| doubts.iter());
+            packets.flat_map(|doubt| doubt[number]).fold(0.0, f32::max)
+        };
+        RayDoubt { cells: worst(0), table_way: worst(1) }
+    }
+}
+
+/// The pixel of a lane of a packet, in a tile row by row.
+#[inline(always)]
+fn place(packet: u32, lane: u32) -> usize {
+    let [x, y] =
+        [packet % TILE_PACKETS * PACKET + lane % PACKET, packet / TILE_PACKETS * PACKET + lane / PACKET];
+    (y * TILE + x) as usize
+}
+
+impl Target {
+    pub(crate) fn new(view: &PictureView<'_>) -> Self {
+        let num_tiles = view.width.div_ceil(TILE) as usize * view.height.div_ceil(TILE) as usize;
+        Self {
+            view: PictureView { meshes: &[], ..*view },
+            surfaces: Surfaces::new(view),
+            tiles: std::iter::repeat_with(Tile::default).take(num_tiles).collect(),
+            shown: Shown::default(),
+        }
+    }
+
+    /// Runs `draw` for every tile, with the surfaces, its number and the column and row of its first pixel.
+    pub(crate) fn draw_tiles(&mut self, draw: impl Fn(&Surfaces, u32, [u32; 2], &mut Tile) + Sync) {
+        let columns = self.view.width.div_ceil(TILE);
+        let Self { surfaces, tiles, .. } = self;
+        tiles.par_iter_mut().enumerate().for_each(|(index, tile)| {
+            let index = index as u32;
+            draw(surfaces, index, [index % columns * TILE, index / columns * TILE], tile);
+        });
+    }
+
+    /// What the rays of all parts may be off by, if there were any.
+    pub(crate) fn ray_doubt(&self) -> Option<RayDoubt> {
+        let worst = || self.tiles.par_iter().map(Tile::worst_doubt).reduce(RayDoubt::default, RayDoubt::max);
+        self.shown.has_rays.then(worst)
+    }
+
+    /// The picture, with what is behind all parts.
+    pub(crate) fn image(&self, level: Level) -> Image {
+        let (width, height) = (self.view.width, self.view.height);
+        // Zeroes need no memory until a band is written, by the thread that fills it.
+        let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+        let bands = pixels.par_chunks_mut((width * TILE) as usize);
+        let tiles = self.tiles.par_chunks(width.div_ceil(TILE) as usize);
+        bands.zip(tiles).enumerate().for_each(|(row, (band, tiles))| {
+            let first_row = row as u32 * TILE;
+            dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || self.fill(band, tiles, first_row)
+            ));
+        });
+        Image { width, height, pixels }
+    }
+
+    /// Fills a band of rows from its tiles.
+    #[inline(always)]
+    fn fill(&self, band: &mut [[f32; 3]], tiles: &[Tile], first_row: u32) {
+        let width = self.view.width;
+        for (row, pixels) in (first_row..).zip(band.chunks_exact_mut(width as usize)) {
+            for (column, pixel) in (0..width).zip(pixels) {
+                let behind = self.surfaces.color(column, row);
+                *pixel = match &tiles[(column / TILE) as usize].light {
+                    None => behind,
+                    Some(light) => {
+                        let [x, y] = [column % TILE, row % TILE];
+                        let packet = &light[(y / PACKET * TILE_PACKETS + x / PACKET) as usize];
+                        let lane = (y % PACKET * PACKET + x % PACKET) as usize;
+                        self.shown.over([0, 1, 2, 3].map(|i| packet[i][lane]), behind)
+                    }
+                };
+            }
+        }
+    }
+}
+
+impl Shown {
+    /// Light before what is behind it.
+    #[inline(always)]
+    fn over(&self, light: [f32; 4], behind: [f32; 3]) -> [f32; 3] {
+        if self.is_planes {
+            return [0, 1, 2].map(|i| light[3].mul_add(behind[i], light[i]));
+        }
+        let sum = [0, 1, 2].map(|i| light[i] + light[3] * behind[i]);
+        let Some([low, high]) = self.emitted else { return sum };
+        // `max` takes the other where the sum is NaN.
+        [0, 1, 2].map(|i| sum[i].max(low[i].min(behind[i])).min(high[i].max(behind[i])))
+    }
+
+    /// Counts a part of sheets, which can emit colours between these.
+    pub(crate) fn add_sheets(&mut self, [low, high]: [[f32; 3]; 2]) {
+        let all = [0, 1, 2];
+        self.emitted = match self.emitted {
+            None if self.num_parts == 0 => Some([low, high]),
+            Some([least, most]) => {
+                Some([all.map(|i| least[i].min(low[i])), all.map(|i| most[i].max(high[i]))])
+            }
+            // What other parts can show is not known.
+            None => None,
+        };
+        (self.num_parts, self.is_planes) = (self.num_parts + 1, false);
+    }
+
+    pub(crate) fn add_rays(&mut self) {
+        self.add_cubes();
+        self.has_rays = true;
+    }
+
+    pub(crate) fn add_planes(&mut self) {
+        self.add_cubes();
+        self.is_planes = true;
+    }
+
+    pub(crate) fn add_cubes(&mut self) {
+        (self.num_parts, self.emitted, self.is_planes) = (self.num_parts + 1, None, false);
+    }
+}
