@@ -2,7 +2,7 @@
 //!
 //! A technique (in `volery`) turns a scene and its dials into plain data: which bricks must be resident,
 //! and a [`Frame`] that places them in visibility order. A [`Backend`] executes it: `volery-software` on
-//! the CPU, `volery-wgpu` on a GPU. Both pass the same `conformance` suite (a feature), so a technique is written
+//! the CPU, `volery-wgpu` on a GPU. Both pass the suite of `volery-conformance`, so a technique is written
 //! once and each executor checks the other.
 //!
 //! # Method
@@ -31,8 +31,6 @@
 pub mod backend;
 pub mod brick;
 pub mod brick_grid;
-#[cfg(feature = "conformance")]
-pub mod conformance;
 pub mod cubes;
 pub mod plane_tiles;
 pub mod planes;

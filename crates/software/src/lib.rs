@@ -221,7 +221,7 @@ impl Backend for SoftwareBackend {
 
 #[cfg(test)]
 mod tests {
-    use volery_frame::conformance;
+    use volery_conformance as conformance;
 
     use super::*;
 

@@ -1,3 +1,3 @@
 //! The suite that every backend passes.
 
-volery_frame::conformance_tests!(volery_software::SoftwareBackend::new());
+volery_conformance::conformance_tests!(volery_software::SoftwareBackend::new());

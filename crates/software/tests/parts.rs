@@ -1,9 +1,9 @@
 //! A picture in parts has the bits of the whole one.
 
-use volery_frame::conformance::pictures_in_parts_are_the_same;
+use volery_conformance::pictures_in_parts_are_the_same;
 use volery_frame::{
     Backend, Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, Frame, Image, PictureView,
-    UploadError, UploadedBytes, VolumeLayout,
+    Revision, UploadError, UploadedBytes, VolumeLayout,
 };
 use volery_software::SoftwareBackend;
 
@@ -20,6 +20,10 @@ impl Backend for Keeping {
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
         self.backend.set_volume(layout)
+    }
+
+    fn volume(&self) -> Option<Revision> {
+        self.backend.volume()
     }
 
     fn is_resident(&self, id: BrickId) -> bool {

@@ -5,7 +5,9 @@ use std::error::Error;
 use std::sync::mpsc;
 
 use glam::DVec3;
-use volery_frame::{Backend, Content, Cube, Cubes, Frame, PictureView, TexelType, Thickness, VolumeLayout};
+use volery_frame::{
+    Backend, Content, Cube, Cubes, Frame, PictureView, Revision, TexelType, Thickness, VolumeLayout,
+};
 use volery_scene::{Camera, TriangleMesh};
 use volery_wgpu::{USEFUL_FEATURES, WgpuBackend, needed_limits};
 
@@ -64,6 +66,7 @@ fn open() -> Result<(wgpu::Device, wgpu::Queue), Box<dyn Error>> {
 
 fn layout() -> VolumeLayout {
     VolumeLayout {
+        revision: Revision::new(),
         cells: [16; 3],
         spacing: DVec3::ONE,
         brick_cells: 8,

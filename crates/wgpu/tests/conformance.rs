@@ -1,4 +1,4 @@
-//! The conformance suite of `volery-frame` on this machine's best device, and what only this backend's limits ask for.
+//! The suite of `volery-conformance` on this machine's best device, and what only this backend's limits ask for.
 //!
 //! Without a device every test fails, unless `VOLERY_WITHOUT_GPU` is set: then all are counted as ignored.
 
@@ -7,8 +7,8 @@ mod embed;
 mod sheets;
 
 use libtest_mimic::{Arguments, Failed, Trial};
+use volery_conformance::{ALL, Property};
 use volery_frame::Image;
-use volery_frame::conformance::{ALL, Property};
 use volery_wgpu::WgpuBackend;
 
 fn main() {

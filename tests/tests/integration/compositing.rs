@@ -1,6 +1,6 @@
 //! What a target's number of bits does to thousands of thin layers: why colour accumulates in 32 bits.
 //!
-//! The backends themselves are held to this by the conformance suite of `volery-frame`
+//! The backends themselves are held to this by the suite of `volery-conformance`
 //! (`thousands_of_thin_layers`); here the alternatives are measured.
 
 use volery_tests::at_most;

@@ -1,6 +1,6 @@
 //! Cubes beyond the limits of one buffer and of one texture: the suite's own pictures are small.
 
-use volery_frame::conformance::Property;
+use volery_conformance::Property;
 use volery_frame::{
     Backend, Content, Cube, Cubes, Frame, Image, PictureView, Revision, TexelType, Thickness, VolumeLayout,
 };

@@ -1,6 +1,6 @@
 //! Drawing on a device and into textures of somebody else's.
 
-use volery_frame::conformance::Property;
+use volery_conformance::Property;
 use volery_frame::{Backend, DrawError, PictureView};
 use volery_scene::{Camera, Projection};
 use volery_wgpu::{OpenError, USEFUL_FEATURES, WgpuBackend, needed_limits};

@@ -1,7 +1,7 @@
 //! Sheets beyond the limits of one buffer and of one texture, and what stays on the device between frames.
 
 use glam::DVec3;
-use volery_frame::conformance::Property;
+use volery_conformance::Property;
 use volery_frame::{
     Backend, Content, Counted, Frame, Image, PictureView, Revision, Sheet, SheetTransfer, SheetVertices,
     Sheets,

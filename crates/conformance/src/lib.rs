@@ -11,12 +11,12 @@
 //!
 //! # What a backend may do
 //! - Stop a ray once it lets through less than [`STOP_TRANSMITTANCE`] of the light; thresholds allow for it.
-//! - Round values to the bins of the frame's [`RayTransfer`](crate::RayTransfer).
+//! - Round values to the bins of the frame's [`RayTransfer`](volery_frame::RayTransfer).
 //! - Nothing else: no sampling distance, no guard distance at the faces of bricks or of the volume.
 //!
 //! # Use
 //! ```text
-//! volery_frame::conformance_tests!(MyBackend::new());
+//! volery_conformance::conformance_tests!(MyBackend::new());
 //! ```
 //! makes a `#[test]` of each property, each with a fresh backend; [`ALL`] lists them for other runners.
 
@@ -40,7 +40,7 @@ mod surfaces;
 mod views;
 mod world;
 
-use crate::Backend;
+use volery_frame::Backend;
 
 /// A ray that lets through less than this may stop.
 pub const STOP_TRANSMITTANCE: f64 = 1.0 / 4096.0;
@@ -64,7 +64,7 @@ macro_rules! properties {
                 $($(
                     #[test]
                     fn $name() {
-                        $d crate::conformance::$name(&mut $d backend);
+                        $d crate::$name(&mut $d backend);
                     }
                 )+)+
             };
@@ -211,6 +211,10 @@ properties! { $
         finished_parts_are_told_once
         pictures_are_begun_and_ended;
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 #[cfg(test)]
 mod tests {

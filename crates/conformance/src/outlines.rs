@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection};
 
-use crate::{Backend, Counted, Sheet};
+use volery_frame::{Backend, Counted, Sheet};
 
 use super::STOP_TRANSMITTANCE;
 use super::oracle::assert_same_bits;

@@ -3,7 +3,7 @@
 use glam::{DVec3, UVec3};
 use volery_scene::{Camera, ControlPoint, Projection, TransferFunction};
 
-use crate::{
+use volery_frame::{
     Backend, Brick, BrickId, Content, Frame, Image, PictureView, PlacedBrick, RayTransfer, Rays, Revision,
     TexelType, Texels, VolumeLayout,
 };

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::Camera;
 
-use crate::{Backend, Image, TexelType};
+use volery_frame::{Backend, Image, TexelType};
 
 use super::oracle::{assert_background, assert_close, assert_shows_something, march_volume};
 use super::world::{

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection};
 
-use crate::{Backend, TexelType};
+use volery_frame::{Backend, TexelType};
 
 use super::oracle::{assert_background, assert_close, assert_shows_something, march_volume};
 use super::world::{BACKGROUND, BACKGROUND_F64, Storage, Volume, draw, marschner_lobb, smooth_transfer};

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection};
 
-use crate::{Backend, TexelType};
+use volery_frame::{Backend, TexelType};
 
 use super::STOP_TRANSMITTANCE;
 use super::oracle::{assert_close, assert_shows_something, march_volume};

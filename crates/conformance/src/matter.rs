@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::Camera;
 
-use crate::{Backend, TexelType};
+use volery_frame::{Backend, TexelType};
 
 use super::STOP_TRANSMITTANCE;
 use super::oracle::{

@@ -7,7 +7,7 @@ use glam::DVec3;
 use volery_scene::mesh::shade;
 use volery_scene::{Camera, Plane, Projection, Ray, TransferFunction, TriangleMesh};
 
-use crate::{
+use volery_frame::{
     Backend, BlendedBrick, Content, Counted, Cube, Cubes, Frame, Image, PictureView, PlacedBrick, Planes,
     PointTransfer, Rays, Sampling, Sheet, SheetTransfer, SheetVertices, Sheets, TexelType, Thickness,
 };

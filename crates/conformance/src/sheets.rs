@@ -7,7 +7,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection, Ray, TransferFunction};
 
-use crate::{
+use volery_frame::{
     Backend, Content, DrawError, Frame, Image, Light, PictureView, Revision, Sheet, SheetTransfer,
     SheetVertices, Sheets, TexelType,
 };
@@ -248,7 +248,7 @@ pub fn strips_add_and_take_away(backend: &mut dyn Backend) {
     cameras().iter().for_each(|(what, camera)| scene.check(what, backend, camera, 3.0 * MAX));
 }
 
-/// Of nothing no more is taken away than [`crate::sheets::MAX_STRIP_DEPTH`], and light that all but ended may rise again.
+/// Of nothing no more is taken away than [`volery_frame::sheets::MAX_STRIP_DEPTH`], and light that all but ended may rise again.
 pub fn negative_thickness_is_bounded(backend: &mut dyn Backend) {
     let camera = perspective(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 30.0);
     let mut scene = Scene::new(DVec3::Z, Table::ramp(1.0));

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Ray, TransferFunction};
 
-use crate::Image;
+use volery_frame::Image;
 
 use super::world::Volume;
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::Camera;
 
-use crate::Backend;
+use volery_frame::Backend;
 
 use super::oracle::{Medium, assert_shows_something, difference, march};
 use super::world::{BACKGROUND_F64, Storage, Volume, draw, smooth_transfer};

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection};
 
-use crate::Backend;
+use volery_frame::Backend;
 
 use super::oracle::{
     Medium, assert_close, assert_shows_something, chord, each_pixel, march, march_volume, over,

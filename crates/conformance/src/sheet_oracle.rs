@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection, Ray};
 
-use crate::{
+use volery_frame::{
     Backend, Content, Counted, DrawError, Frame, Image, Light, PictureView, Quantization, Revision, Sheet,
     SheetTransfer, SheetVertices, Sheets,
 };
@@ -197,7 +197,7 @@ impl Scene {
                 let [r, g, b, extinction] = self.table.classify(value, gradient[3]);
                 let shade = self.shade(DVec3::new(gradient[0], gradient[1], gradient[2]));
                 let thickness = f64::from(sheet.thickness[0]) + f64::from(sheet.thickness[1]) * along;
-                let limit = f64::from(crate::sheets::MAX_STRIP_DEPTH);
+                let limit = f64::from(volery_frame::sheets::MAX_STRIP_DEPTH);
                 let most = if sheet.thickness[1] == 0.0 { f64::INFINITY } else { limit };
                 let depth = (extinction * thickness / cosine).max(-limit).min(most);
                 light = over([r, g, b].map(|x| x * shade), depth, light);

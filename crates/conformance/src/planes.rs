@@ -3,8 +3,8 @@
 use glam::DVec3;
 use volery_scene::{Camera, Plane, Projection, TransferFunction};
 
-use crate::planes::MAX_PLANES;
-use crate::{Backend, DrawError, Sampling, TexelType};
+use volery_frame::planes::MAX_PLANES;
+use volery_frame::{Backend, DrawError, Sampling, TexelType};
 
 use super::oracle::{assert_background, assert_close, assert_same_bits};
 use super::plane_oracle::{Blended, Look, blended, check, try_draw, unblended};
@@ -274,9 +274,9 @@ pub fn colors_show_themselves(backend: &mut dyn Backend) {
         }
     }
     let (camera, transfer) = (cameras(volume.extent())[0], &volume.integrated(&smooth_transfer(1.0)));
-    let content = crate::Content::Rays(crate::Rays { transfer, bricks: &[] });
-    let frame = crate::Frame {
-        view: crate::PictureView { width: 5, height: 5, camera, background: BACKGROUND, meshes: &[] },
+    let content = volery_frame::Content::Rays(volery_frame::Rays { transfer, bricks: &[] });
+    let frame = volery_frame::Frame {
+        view: volery_frame::PictureView { width: 5, height: 5, camera, background: BACKGROUND, meshes: &[] },
         content,
     };
     assert_eq!(backend.draw(&frame).err(), Some(DrawError::RaysThroughColors), "rays through colours");
@@ -525,9 +525,9 @@ pub fn wrong_frames_of_planes_are_named(backend: &mut dyn Backend) {
     let look = Look::opaque(vec![good], colors());
     bricks.remove(1);
     try_draw(backend, &volume, &bricks, &look, &camera, SIZE).expect("a right frame");
-    let missing = crate::BlendedBrick { placed: volume.bricks(&camera)[1].placed, low_corners: 0 };
-    let transfer = &crate::PointTransfer::new(&look.transfer, &volume.layout);
-    let content = crate::Content::Planes(crate::Planes {
+    let missing = volery_frame::BlendedBrick { placed: volume.bricks(&camera)[1].placed, low_corners: 0 };
+    let transfer = &volery_frame::PointTransfer::new(&look.transfer, &volume.layout);
+    let content = volery_frame::Content::Planes(volery_frame::Planes {
         planes: &look.planes,
         bricks: &[missing],
         transfer,
@@ -535,8 +535,8 @@ pub fn wrong_frames_of_planes_are_named(backend: &mut dyn Backend) {
         is_transparent: false,
         shows_bricks: false,
     });
-    let frame = crate::Frame {
-        view: crate::PictureView { width: 9, height: 9, camera, background: BACKGROUND, meshes: &[] },
+    let frame = volery_frame::Frame {
+        view: volery_frame::PictureView { width: 9, height: 9, camera, background: BACKGROUND, meshes: &[] },
         content,
     };
     assert_eq!(backend.draw(&frame).err(), Some(DrawError::NotResident { id }), "a missing brick");

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::Camera;
 
-use crate::{
+use volery_frame::{
     Backend, Brick, BrickId, Content, DrawError, Frame, Image, PictureView, PlacedBrick, Rays, TexelType,
     Texels, UploadError,
 };

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use volery_scene::{Camera, Plane, Projection, Ray, TransferFunction};
 
-use crate::planes::{OUTLINE_PIXELS, outline_color};
-use crate::{
+use volery_frame::planes::{OUTLINE_PIXELS, outline_color};
+use volery_frame::{
     Backend, BlendedBrick, Content, DrawError, Frame, Image, PictureView, PlacedBrick, Planes, PointTransfer,
     Sampling,
 };

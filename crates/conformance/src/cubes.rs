@@ -7,7 +7,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Projection, Ray};
 
-use crate::{
+use volery_frame::{
     Backend, Content, Cube, Cubes, Frame, Image, PictureView, Revision, TexelType, Thickness, VolumeLayout,
 };
 

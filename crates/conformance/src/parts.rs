@@ -3,7 +3,7 @@
 use glam::DVec3;
 use volery_scene::{Camera, Plane, TriangleMesh};
 
-use crate::{
+use volery_frame::{
     Backend, BlendedBrick, Brick, BrickId, Content, Counted, Cube, Cubes, DrawError, Drawn, Frame, Image,
     PictureView, PlacedBrick, Planes, PointTransfer, RayTransfer, Rays, Revision, Sampling, Sheet,
     SheetTransfer, SheetVertices, Sheets, TexelType, Texels, Thickness, UploadedBytes,
