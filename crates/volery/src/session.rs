@@ -156,13 +156,14 @@ impl<D: Data> Session<D> {
 
     /// The place of the technique of a view that can be drawn.
     pub(crate) fn check(&self, view: &View) -> Result<usize, RenderError> {
-        view.check()?;
         let place = self.techniques.iter().position(|(technique, _)| technique.draws(&view.how));
         let place = place.ok_or_else(|| RenderError::OtherData {
             technique: view.how.name(),
             found: self.data.input().kind,
         })?;
+        // First: what cannot be drawn at all has no camera either.
         self.techniques[place].0.check(&self.data, view)?;
+        view.check()?;
         Ok(place)
     }
 

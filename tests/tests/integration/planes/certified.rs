@@ -11,7 +11,10 @@ use super::{ENGINE, MOUSE, MRI, Random, colors, read, software};
 /// Largest errors to ask for, in turn.
 const ERRORS: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
 
-const NUM_PLANES: usize = 200;
+const NUM_PLANES: usize = 260;
+
+/// Pictures of all volumes that a dial must change, or nothing is tested.
+const MIN_CHANGED: usize = 400;
 
 /// The largest difference of any channel of any pixel.
 fn largest_difference(session: &mut Drawer<VolumeData>, view: &View) -> (f64, f64) {
@@ -65,7 +68,7 @@ fn ratios(name: &str, data: &Path) -> Vec<f64> {
     ratios.concat()
 }
 
-/// No pixel of 200 planes through each volume is farther off than the bound, and no bound is above what was asked
+/// No pixel of 260 planes through each volume is farther off than the bound, and no bound is above what was asked
 /// for. Half of the bounds of each volume are within 3 times the measured maximum.
 #[test]
 fn real_data_keep_their_bound_and_it_is_tight() {
@@ -78,7 +81,7 @@ fn real_data_keep_their_bound_and_it_is_tight() {
         at_most(&what, median(of_volume.clone()), 3.0);
         all.extend(of_volume);
     }
-    assert!(all.len() > 2 * NUM_PLANES, "only {} pictures differ from the full resolution", all.len());
+    assert!(all.len() > MIN_CHANGED, "only {} pictures differ from the full resolution", all.len());
     at_most(&format!("median bound / measured of all {} planes", all.len()), median(all), 3.0);
 }
 
