@@ -1,7 +1,9 @@
 //! Pictures of cells that list nodes more than once, and of cells without volume.
 
 use glam::DVec3;
-use volery_frame::{Backend, Content, Counted, Frame, PictureView, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{
+    Backend, Content, Counted, Frame, PictureView, Sheet, SheetTransfer, SheetVertices, Sheets,
+};
 use volery_scene::{Camera, CellType, Cells, Projection, UnstructuredGrid};
 use volery_slicing::{Planes, Slicer};
 use volery_software::SoftwareBackend;

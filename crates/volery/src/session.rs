@@ -338,7 +338,9 @@ impl Session {
                     shows_bricks: view.planes.shows_nodes,
                 })
             }
-            Plan::Cubes(plan) => Content::Cubes(Cubes { revision: None, cubes: &plan.cubes, thickness: view.thickness }),
+            Plan::Cubes(plan) => {
+                Content::Cubes(Cubes { revision: None, cubes: &plan.cubes, thickness: view.thickness })
+            }
         };
         let picture = PictureView {
             width: view.width,

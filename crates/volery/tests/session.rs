@@ -12,7 +12,8 @@ use volery::{
     SampleType, Session, Technique, TransferFunction, View, ViewOptions, VoxelGrid, open_backend,
 };
 use volery_frame::{
-    Brick, BrickId, Content, DrawError, Drawn, FinishedPart, PictureView, UploadError, UploadedBytes, VolumeLayout,
+    Brick, BrickId, Content, DrawError, Drawn, FinishedPart, PictureView, UploadError, UploadedBytes,
+    VolumeLayout,
 };
 
 fn software() -> Box<dyn Backend> {
@@ -208,7 +209,7 @@ impl Backend for Narrow {
 
     fn evict(&mut self, bricks: &[BrickId]) {
         let mut held = self.bricks.lock().unwrap();
-        bricks.iter().for_each(|id| drop(held.remove(id)));
+        held.retain(|id, _| !bricks.contains(id));
     }
 
     fn resident_bytes(&self) -> u64 {

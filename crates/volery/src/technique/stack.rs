@@ -7,7 +7,7 @@
 //! (`volery_frame::sheets`), so a normal that is not the ray's own costs accuracy, not brightness.
 //!
 //! Strips of the outline carry what slabs have too much or too little where the grid ends. Their sign is a matter of
-//! which side the ray comes in, so they are put in order for the rays at hand.
+//! which side the ray comes in, so who draws them finds it out for each ray (`volery_frame::Counted`).
 //!
 //! # Accuracy
 //! Of second order in the distance between planes where colour and extinction are continuous functions of the value and
@@ -24,11 +24,11 @@ use std::time::Instant;
 
 use glam::DVec3;
 use volery_frame::{
-    Backend, Content, Device, DrawError, Frame, Image, Light, PictureView, Quantization, Revision, Sheet,
-    SheetTransfer, SheetVertices, Sheets, Thickness,
+    Backend, Content, Counted, Device, DrawError, Frame, Image, Light, PictureView, Quantization, Revision,
+    Sheet, SheetTransfer, SheetVertices, Sheets, Thickness,
 };
 use volery_scene::{Camera, Projection, Samples, TransferFunction, TransferFunction2d};
-use volery_slicing::{MeshSheet, Planes, QuantizedMesh, Rays, Refinement, SliceMesh, Slicer, error};
+use volery_slicing::{MeshSheet, Planes, QuantizedMesh, Refinement, SliceMesh, Slicer, error};
 
 use crate::fit;
 use crate::report::{self, Report};
@@ -141,10 +141,8 @@ pub(crate) struct Stack {
     mesh: SliceMesh,
     /// What is drawn in place of the mesh's own vertices.
     quantized: Option<QuantizedMesh>,
-    /// Triangles and sheets before strips were put in order: what comes of that depends on the rays alone.
-    unordered: (Vec<[u32; 3]>, Vec<MeshSheet>),
-    /// The rays that its strips are in order for.
-    rays: Rays,
+    /// Its sheets for any eye.
+    sheets: Vec<MeshSheet>,
     /// Names the contents of the mesh.
     revision: Revision,
     /// The revision that was drawn last.
@@ -180,11 +178,9 @@ impl Recipe {
 }
 
 impl Stack {
-    /// Of a mesh whose strips are in order for rays along its normal.
     fn new(mesh: SliceMesh, quantized: Option<QuantizedMesh>) -> Self {
-        let unordered = (mesh.triangles.clone(), mesh.sheets.clone());
-        let (rays, revision) = (Rays::Along(mesh.normal), Revision::new());
-        Self { mesh, quantized, unordered, rays, revision, sent: None }
+        let sheets = mesh.sheets_for_any_eye();
+        Self { mesh, quantized, sheets, revision: Revision::new(), sent: None }
     }
 
     /// Of a mesh from a file, drawn as it is there.
@@ -218,20 +214,6 @@ impl Stack {
         }
         self.revision = Revision::new();
         Ok(())
-    }
-
-    /// Puts strips in order for a camera.
-    fn orient(&mut self, camera: &Camera) {
-        let rays = match camera.projection {
-            Projection::Perspective { .. } => Rays::From(camera.eye),
-            Projection::Orthographic { .. } => Rays::Along(camera.axes()[2]),
-        };
-        if rays != self.rays {
-            self.mesh.triangles.copy_from_slice(&self.unordered.0);
-            self.mesh.sheets.clone_from(&self.unordered.1);
-            self.mesh.orient_strips(rays);
-            (self.rays, self.revision) = (rays, Revision::new());
-        }
     }
 
     /// Draws, by a backend. Returns the picture, and how many bytes of vertices and triangles it had not been sent.
@@ -279,8 +261,13 @@ impl Stack {
             first: sheet.triangles.start,
             count: sheet.triangles.end - sheet.triangles.start,
             thickness: sheet.thickness.map(|part| part as f32),
+            counted: match sheet.thickness[1] {
+                0.0 => Counted::All,
+                slope if slope > 0.0 => Counted::Rising,
+                _ => Counted::Falling,
+            },
         };
-        self.mesh.back_to_front(eye).map(sheet).collect()
+        MeshSheet::back_to_front(&self.sheets, eye).map(sheet).collect()
     }
 
     /// How many planes met cells.
@@ -350,7 +337,6 @@ impl Frames {
     ) -> Result<(), DrawError> {
         let start = Instant::now();
         let transfer = Tabulated::get(table, view, range);
-        stack.orient(&view.camera);
         let select = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let (image, bytes) = stack.draw(view, transfer, backend)?;
