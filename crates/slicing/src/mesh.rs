@@ -110,28 +110,54 @@ impl MeshSheet {
     pub fn is_strip(&self) -> bool {
         self.thickness[1] != 0.0
     }
+
+    /// Whether two that follow one another are strips of one gap.
+    fn is_one_gap(&self, next: &Self) -> bool {
+        let is_same = self.thickness == next.thickness || self.thickness == next.thickness.map(|part| -part);
+        self.is_strip() && self.triangles.end == next.triangles.start && is_same
+    }
+
+    /// Sheets in the order of a mesh's, from back to front: see [`SliceMesh::back_to_front`].
+    pub fn back_to_front(sheets: &[Self], eye: f64) -> impl Iterator<Item = &Self> {
+        // Rays from the eye go up or down: neither kind meets what the other meets. Only strips of the gap that the
+        // eye is in may reach to both sides; nothing is nearer.
+        let (below, above) = sheets.split_at(sheets.partition_point(|sheet| sheet.position < eye));
+        let (near, above) = above.split_at(above.iter().take_while(|sheet| sheet.is_strip()).count());
+        above.iter().rev().chain(below).chain(near.iter().rev())
+    }
 }
 
 impl SliceMesh {
     /// The sheets from back to front, seen from a place `eye` along the normal (relative to the origin); of parallel
     /// rays an infinite one: negative where rays go along the normal.
     pub fn back_to_front(&self, eye: f64) -> impl Iterator<Item = &MeshSheet> {
-        // Rays from the eye go up or down: neither kind meets what the other meets. Only strips of the gap that the
-        // eye is in may reach to both sides; nothing is nearer.
-        let (below, above) = self.sheets.split_at(self.sheets.partition_point(|sheet| sheet.position < eye));
-        let (near, above) = above.split_at(above.iter().take_while(|sheet| sheet.is_strip()).count());
-        above.iter().rev().chain(below).chain(near.iter().rev())
+        MeshSheet::back_to_front(&self.sheets, eye)
+    }
+
+    /// The sheets with all strips of a gap listed as two of the same triangles, the first with a thickness that rises
+    /// along the normal: for those who find out for each ray which of them count.
+    pub fn sheets_for_any_eye(&self) -> Vec<MeshSheet> {
+        let mut sheets = Vec::with_capacity(self.sheets.len());
+        for gap in self.sheets.chunk_by(MeshSheet::is_one_gap) {
+            let [first, last] = [&gap[0], &gap[gap.len() - 1]];
+            if !first.is_strip() {
+                sheets.extend_from_slice(gap);
+                continue;
+            }
+            let triangles = first.triangles.start..last.triangles.end;
+            for sign in [first.thickness[1].signum(), -first.thickness[1].signum()] {
+                let thickness = first.thickness.map(|part| part * sign);
+                sheets.push(MeshSheet { thickness, triangles: triangles.clone(), ..first.clone() });
+            }
+        }
+        sheets
     }
 
     /// Puts every triangle of a strip into the sheet with the slope that these rays ask for: where a ray leaves the
     /// grid, its thickness rises along the ray, where it comes in, it falls. A new mesh is oriented for rays along
     /// its normal. Triangles keep their ranges, all strips of a gap together.
     pub fn orient_strips(&mut self, rays: Rays) {
-        let is_one_gap = |a: &MeshSheet, b: &MeshSheet| {
-            let is_same = a.thickness == b.thickness || a.thickness == b.thickness.map(|part| -part);
-            a.is_strip() && a.triangles.end == b.triangles.start && is_same
-        };
-        let gaps: Vec<&[MeshSheet]> = self.sheets.chunk_by(is_one_gap).collect();
+        let gaps: Vec<&[MeshSheet]> = self.sheets.chunk_by(MeshSheet::is_one_gap).collect();
         let split = |gap: &&[MeshSheet]| {
             let (first, last) = (gap.first()?, gap.last()?);
             let range = first.triangles.start as usize..last.triangles.end as usize;

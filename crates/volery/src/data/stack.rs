@@ -54,12 +54,8 @@ impl StackData {
         self.stack.has_gradients()
     }
 
-    pub(crate) fn stack(&self) -> &Stack {
+    pub(crate) fn stack(&self) -> &Arc<Stack> {
         &self.stack
-    }
-
-    pub(crate) fn stack_mut(&mut self) -> &mut Arc<Stack> {
-        &mut self.stack
     }
 }
 

@@ -7,7 +7,7 @@
 //! (`volery_frame::sheets`), so a normal that is not the ray's own costs accuracy, not brightness.
 //!
 //! Strips of the outline carry what slabs have too much or too little where the grid ends. Their sign is a matter of
-//! which side the ray comes in, so they are put in order for the rays at hand.
+//! which side the ray comes in, so who draws them finds it out for each ray (`volery_frame::Counted`).
 //!
 //! # Accuracy
 //! Of second order in the distance between planes where colour and extinction are continuous functions of the value and
@@ -26,7 +26,7 @@ use glam::DVec3;
 use volery_frame::{Counted, Light, Quantization, Revision, Sheet, SheetTransfer, SheetVertices, Sheets};
 use volery_reference::GridTracer;
 use volery_scene::{Camera, Projection, Samples};
-use volery_slicing::{MeshSheet, QuantizedMesh, Rays, SliceMesh, error};
+use volery_slicing::{MeshSheet, QuantizedMesh, SliceMesh, error};
 
 mod stacks;
 
@@ -62,20 +62,26 @@ pub enum Error {
     Quantize(#[from] error::Quantize),
 }
 
-/// The table of a transfer function over a range of values.
-type Table = Kept<(Transfer, [f64; 2]), SheetTransfer>;
+/// What the last picture was drawn with.
+#[derive(Default)]
+struct Drawn {
+    /// Of its transfer function over a range of values.
+    table: Kept<(Transfer, [f64; 2]), SheetTransfer>,
+    /// Of its stack.
+    revision: Option<Revision>,
+}
 
 /// Slices through a grid, for the last views.
 #[derive(Default)]
 pub(crate) struct OfGrid {
     stacks: Stacks,
-    table: Table,
+    drawn: Drawn,
 }
 
 /// Slices that were made before.
 #[derive(Default)]
 pub(crate) struct OfStack {
-    table: Table,
+    drawn: Drawn,
 }
 
 impl Technique<GridData> for OfGrid {
@@ -114,7 +120,7 @@ impl Technique<GridData> for OfGrid {
         self.stacks.make(stack_view, view, grid)?;
         let shown = self.stacks.shown(stack_view.slicing, &view.camera).ok_or(RenderError::NoSlice)?;
         let seconds = start.elapsed().as_secs_f64() + grid.take_step_seconds();
-        let plan = plan(shown, &mut self.table, view, grid.value_range());
+        let plan = plan(shown, &mut self.drawn, view, grid.value_range());
         let slice_bytes = plan.work.slice_bytes.map(|[_, sent]| [self.stacks.num_bytes(), sent]);
         let work = Work { slice_bytes, ..plan.work };
         Ok(Plan { geometry_seconds: Some(seconds), work, ..plan })
@@ -153,8 +159,7 @@ impl Technique<StackData> for OfStack {
     }
 
     fn plan(&mut self, stack: &mut StackData, view: &View) -> Result<Plan, RenderError> {
-        let range = stack.value_range();
-        Ok(plan(stack.stack_mut(), &mut self.table, view, range))
+        Ok(plan(stack.stack(), &mut self.drawn, view, stack.value_range()))
     }
 
     /// # Errors
@@ -211,20 +216,17 @@ fn view<D: Data>(
 }
 
 /// The plan of a stack, with the values of `range`.
-fn plan(stack: &mut Arc<Stack>, table: &mut Table, view: &View, range: [f64; 2]) -> Plan {
-    let transfer = table.get(&(view.transfer.clone(), range), || match &view.transfer {
+fn plan(stack: &Arc<Stack>, drawn: &mut Drawn, view: &View, range: [f64; 2]) -> Plan {
+    let transfer = drawn.table.get(&(view.transfer.clone(), range), || match &view.transfer {
         Transfer::Values(transfer) => SheetTransfer::new(transfer, range),
         Transfer::Magnitudes(function) => SheetTransfer::new_2d(function),
     });
-    // The plan before is drawn, so nothing is copied.
-    let own = Arc::make_mut(stack);
-    own.orient(&view.camera);
-    let is_new = own.sent.replace(own.revision) != Some(own.revision);
-    let bytes = own.num_bytes();
+    let is_new = drawn.revision.replace(stack.revision) != Some(stack.revision);
+    let bytes = stack.num_bytes();
     let work = Work {
-        polygons: own.mesh.num_polygons,
-        slices: Some(own.num_slices()),
-        triangles: Some(own.mesh.triangles.len()),
+        polygons: stack.mesh.num_polygons,
+        slices: Some(stack.num_slices()),
+        triangles: Some(stack.mesh.triangles.len()),
         slice_bytes: Some([bytes, if is_new { bytes } else { 0 }]),
         ..Work::default()
     };
@@ -237,28 +239,22 @@ fn plan(stack: &mut Arc<Stack>, table: &mut Table, view: &View, range: [f64; 2])
     Plan { drawing, store: None, work, bound_max: None, geometry_seconds: None }
 }
 
-/// Slices with strips in order for some rays.
+/// Slices and strips of the outline between them.
 #[derive(Clone, Debug)]
 pub struct Stack {
     mesh: SliceMesh,
     /// What is drawn in place of the mesh's own vertices.
     quantized: Option<QuantizedMesh>,
-    /// Triangles and sheets before strips were put in order: what comes of that depends on the rays alone.
-    unordered: (Vec<[u32; 3]>, Vec<MeshSheet>),
-    /// The rays that its strips are in order for.
-    rays: Rays,
+    /// Its sheets for any eye.
+    sheets: Vec<MeshSheet>,
     /// Names the contents of the mesh.
     revision: Revision,
-    /// The revision that was drawn last.
-    sent: Option<Revision>,
 }
 
 impl Stack {
-    /// Of a mesh whose strips are in order for rays along its normal.
     pub(crate) fn new(mesh: SliceMesh, quantized: Option<QuantizedMesh>) -> Self {
-        let unordered = (mesh.triangles.clone(), mesh.sheets.clone());
-        let (rays, revision) = (Rays::Along(mesh.normal), Revision::new());
-        Self { mesh, quantized, unordered, rays, revision, sent: None }
+        let sheets = mesh.sheets_for_any_eye();
+        Self { mesh, quantized, sheets, revision: Revision::new() }
     }
 
     /// Of a mesh from a file, drawn as it is there.
@@ -292,20 +288,6 @@ impl Stack {
         }
         self.revision = Revision::new();
         Ok(())
-    }
-
-    /// Puts strips in order for a camera.
-    fn orient(&mut self, camera: &Camera) {
-        let rays = match camera.projection {
-            Projection::Perspective { .. } => Rays::From(camera.eye),
-            Projection::Orthographic { .. } => Rays::Along(camera.axes()[2]),
-        };
-        if rays != self.rays {
-            self.mesh.triangles.copy_from_slice(&self.unordered.0);
-            self.mesh.sheets.clone_from(&self.unordered.1);
-            self.mesh.orient_strips(rays);
-            (self.rays, self.revision) = (rays, Revision::new());
-        }
     }
 
     /// For a backend.
@@ -342,9 +324,13 @@ impl Stack {
             first: sheet.triangles.start,
             count: sheet.triangles.end - sheet.triangles.start,
             thickness: sheet.thickness.map(|part| part as f32),
-            counted: Counted::All,
+            counted: match sheet.thickness[1] {
+                0.0 => Counted::All,
+                slope if slope > 0.0 => Counted::Rising,
+                _ => Counted::Falling,
+            },
         };
-        self.mesh.back_to_front(eye).map(sheet).collect()
+        MeshSheet::back_to_front(&self.sheets, eye).map(sheet).collect()
     }
 
     /// How many planes met cells.

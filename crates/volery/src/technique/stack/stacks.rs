@@ -98,13 +98,13 @@ impl Stacks {
     }
 
     /// The one that a view shows, once it is made.
-    pub(super) fn shown(&mut self, slicing: Slicing, camera: &Camera) -> Option<&mut Arc<Stack>> {
+    pub(super) fn shown(&self, slicing: Slicing, camera: &Camera) -> Option<&Arc<Stack>> {
         let shown = match slicing {
-            Slicing::Immediate => self.immediate.as_mut(),
+            Slicing::Immediate => self.immediate.as_ref(),
             Slicing::Axes => {
                 let along = camera.axes()[2].abs();
                 let nearest = (0..3).rev().max_by(|&a, &b| along[a].total_cmp(&along[b]));
-                nearest.and_then(|axis| self.axes.get_mut(axis))
+                nearest.and_then(|axis| self.axes.get(axis))
             }
         };
         shown.map(|(_, stack)| stack)
