@@ -40,7 +40,16 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
     stage("lints", || {
         shell::run(&mut shell::cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
     })?;
+    stage("without wgpu", || {
+        let software = ["clippy", "--package", "volery", "--no-default-features", "--", "-D", "warnings"];
+        shell::run(&mut shell::cargo(&software))
+    })?;
     stage("tidy", tidy::run)?;
+    // That each can be packaged; what it holds is built by the other stages.
+    stage("packages", || {
+        let package = ["package", "--workspace", "--exclude", "volery-tests", "--exclude", "xtask"];
+        shell::run(shell::cargo(&package).args(["--no-verify", "--allow-dirty", "--quiet"]))
+    })?;
     stage("documentation", || {
         let mut doc =
             shell::cargo(&["doc", "--workspace", "--no-deps", "--lib", "--all-features", "--quiet"]);
