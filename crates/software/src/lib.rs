@@ -41,6 +41,7 @@
 //! The same bits for any number of threads. No `unsafe`.
 
 mod brick;
+mod cell;
 mod cubes;
 mod exact;
 mod math;

@@ -221,8 +221,11 @@ fn draw_tile<S: Simd, T: Texel>(
             let [r, g, b]: [[f32; 16]; 3] = light.color.map(Into::into);
             let clear: [f32; 16] = light.transmittance.into();
             let worst = |lanes: [f32; 16]| lanes.into_iter().fold(0.0, f32::max);
-            doubt = doubt
-                .max(RayDoubt { cells: worst(light.doubt.into()), table_way: worst(light.table_way.into()) });
+            doubt = doubt.max(RayDoubt {
+                cells: worst(light.doubt.into()),
+                table_way: worst(light.table_way.into()),
+                touching: worst(light.touching.into()),
+            });
             for lane in 0..16 {
                 let pixel = (y + lane as u32 / PACKET) * TILE + x + lane as u32 % PACKET;
                 let background = pixels[pixel as usize];

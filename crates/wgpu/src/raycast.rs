@@ -9,8 +9,8 @@ use crate::bindings::{bind_group_layout, buffer};
 use crate::gpu::{Failure, Gpu};
 use crate::units::Units;
 
-/// Bytes of two numbers.
-const WORST_BYTES: u64 = 8;
+/// Bytes of three numbers.
+const WORST_BYTES: u64 = 12;
 
 /// The pipeline in its forms.
 pub(crate) struct Raycast {
@@ -20,7 +20,7 @@ pub(crate) struct Raycast {
     pipelines: HashMap<Form, wgpu::ComputePipeline>,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
-    /// The two numbers of a [`RayDoubt`], and where they are read.
+    /// The three numbers of a [`RayDoubt`], and where they are read.
     worst: [wgpu::Buffer; 2],
 }
 
@@ -147,12 +147,12 @@ impl Raycast {
             gpu.wait()
         })??;
         let view = staging.get_mapped_range(..).map_err(|e| Failure::Other(e.to_string()))?;
-        let [cells, table_way] =
-            [0, 4].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
+        let [cells, table_way, touching] =
+            [0, 4, 8].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
         drop(view);
         staging.unmap();
         // Ways are depths to the base 2.
-        Ok(RayDoubt { cells, table_way: table_way * std::f32::consts::LN_2 })
+        Ok(RayDoubt { cells, table_way: table_way * std::f32::consts::LN_2, touching })
     }
 
     /// The pipeline of one form, compiled if this is the first frame that needs it.

@@ -87,6 +87,30 @@ pub fn a_bent_field_has_its_mean(backend: &mut dyn Backend) {
     }
 }
 
+/// Whole numbers at a step so weak that the table is read: they belong to what is above it. On the other side they would
+/// be off by .03.
+pub fn values_at_a_weak_step_are_above_it(backend: &mut dyn Backend) {
+    let volume = Volume::new([21, 17, 25], DVec3::ONE, Storage::plain(TexelType::U8), |p| match p.x {
+        x if x < 3.0 => 1.0,
+        x if x < 17.0 => 2.0,
+        _ => 4.0,
+    });
+    let tf = transfer(
+        &[
+            [1.0, 0.9, 0.8, 0.3, 0.01],
+            [2.0, 0.9, 0.8, 0.3, 0.01],
+            [2.0, 0.9, 0.8, 0.3, 0.014],
+            [4.0, 0.9, 0.8, 0.3, 0.014],
+        ],
+        1.0,
+    );
+    let camera = Camera::fitted(volume.extent(), 80.0, 10.0, 1.0, false);
+    let expected = march_volume(&volume, &tf, 64.0, &camera, SIZE, BACKGROUND_F64);
+    assert_shows_something("weak step", &expected, BACKGROUND_F64);
+    let image = draw(backend, &volume, &tf, &camera, SIZE);
+    assert_close("weak step", &image, &expected, 2e-3, 1e-3);
+}
+
 /// A ramp whose colour changes along the ray: front colours hide those behind.
 pub fn color_ramp_matches_the_march(backend: &mut dyn Backend) {
     let volume = Volume::new([12, 14, 33], DVec3::ONE, Storage::F32, |p| (p.z / 32.0 + p.x * 0.01).min(1.1));
