@@ -466,15 +466,19 @@ impl<S: Simd> Course<S> {
         let one = i32x16::splat(simd, 1);
         let beside = lanes.select(is_low.select(self.band - one, self.band + one), self.band);
         let other = bands.rows(simd, beside);
-        let here = row.whole_extinction(simd, is_low.select(row.low, row.high));
-        let there = other.whole_extinction(simd, is_low.select(other.high, other.low));
+        // As far behind the edge as rounding may take the field: all of a spike that is narrower.
+        let [edge, behind] =
+            [is_low.select(row.low, row.high), is_low.select(other.high - rounding, other.low + rounding)];
+        let behind = behind.max(other.low).min(other.high);
+        let (here, there) = (row.whole_extinction(simd, edge), other.whole_extinction(simd, behind));
         let [r, g, b] = axes(
             #[inline(always)]
             |i| {
-                let [low, high] = [is_low.select(row.low, row.high), is_low.select(other.high, other.low)];
-                (row.color_slope[i].mul_add(low, row.color[i])
-                    - other.color_slope[i].mul_add(high, other.color[i]))
-                .abs()
+                let [here, there] = [(row, edge), (&other, behind)].map(
+                    #[inline(always)]
+                    |(row, u)| row.color_slope[i].mul_add(u, row.color[i]),
+                );
+                (here - there).abs()
             },
         );
         let change = r.max(g).max(b).mul_add(here.min(there), (here - there).abs());

@@ -221,8 +221,8 @@ impl<S: Simd> Piece<S> {
             |i| to.integrals[i] - from.integrals[i],
         );
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        // So far beyond the table that two ends are one there is nothing.
-        let is_seen = extinction.abs().simd_gt(INVISIBLE) & bins.simd_ne(0.0);
+        // So far beyond the table that two ends are one there is nothing; nor is there in a blank, which is no number.
+        let is_seen = extinction.abs().simd_gt(INVISIBLE) & bins.abs().simd_gt(0.0);
         // One division for two.
         let quotient = 1.0 / is_seen.select(bins * extinction, one);
         let inverse = is_seen.select(bins * quotient, zero);

@@ -91,8 +91,12 @@ impl Scene {
         Ok(Measured {
             max: or_infinite(found.max),
             rmse: or_infinite(found.rmse),
-            // Where no brick holds matter nothing is drawn, and nothing may be off.
-            stated: picture.report.error.and_then(|error| error.budget).map_or(0.0, |budget| budget.max),
+            // Where no brick holds matter nothing is drawn but the background, in f32.
+            stated: picture
+                .report
+                .error
+                .and_then(|error| error.budget)
+                .map_or(f64::from(f32::EPSILON), |budget| budget.max),
             seconds,
         })
     }

@@ -179,10 +179,11 @@ fn touch(light: ptr<function, Light>, index: u32, cubic: vec4f, width: f32, u: f
     let way = min(8.0 * rounding / max(slope + sqrt(slope * slope + square), 1e-30), 1.0);
     let other = band_at(select(index + 1u, index - 1u, is_low));
     let edge = select(band.high, band.low, is_low);
-    let other_edge = select(other.low, other.high, is_low);
+    // As far behind the edge as rounding may take the field: all of a spike that is narrower.
+    let behind = clamp(select(other.low + rounding, other.high - rounding, is_low), other.low, other.high);
     let here = extinction_at(band, edge);
-    let there = extinction_at(other, other_edge);
-    let tint = largest(abs(band.color + band.color_slope * edge - other.color - other.color_slope * other_edge));
+    let there = extinction_at(other, behind);
+    let tint = largest(abs(band.color + band.color_slope * edge - other.color - other.color_slope * behind));
     let depth = (abs(here - there) + tint * min(here, there)) * length * way;
     (*light).touching += (*light).transmittance * (1.0 - exp2(-min(depth, 60.0)));
 }
