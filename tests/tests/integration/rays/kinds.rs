@@ -175,13 +175,13 @@ fn rays_in_the_faces_of_the_domain(choice: BackendChoice, test: &str) {
     for (forward, up) in [(0, 2), (1, 0), (2, 1)] {
         for (sign, mirror) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)] {
             // Half a unit from pixel to pixel, with rays at 0 and at the last sample along both axes.
-            let size = [35, 35];
+            let size = [25, 25];
             let eye = grid.extent().floor() / 2.0 - DVec3::AXES[forward] * sign * 32.0;
             let camera = Camera {
                 eye,
                 target: eye + DVec3::AXES[forward] * sign,
                 up: DVec3::AXES[up] * mirror,
-                projection: Projection::Orthographic { height: 17.5 },
+                projection: Projection::Orthographic { height: 12.5 },
             };
             judge.judge_from(&format!("along axis {forward} x {sign}"), &grid, camera, ramp(), size);
         }
