@@ -29,8 +29,8 @@ const RING_FREQUENCY: f64 = 6.0;
 /// Their amplitude, `α` in the paper.
 const RING_AMPLITUDE: f64 = 0.25;
 
-/// One value per grid point, x fastest.
-fn fill<T>(dims: [usize; 3], mut value_at: impl FnMut([usize; 3]) -> T) -> Vec<T> {
+/// One value per grid point, x fastest, of its index along each axis.
+pub fn fill<T>(dims: [usize; 3], mut value_at: impl FnMut([usize; 3]) -> T) -> Vec<T> {
     let [nx, ny, nz] = dims;
     let mut values = Vec::with_capacity(nx * ny * nz);
     for z in 0..nz {

@@ -61,6 +61,7 @@ fn the_report_has_the_keys_of_the_contract_and_no_others() {
         "error.budget.max",
         "error.budget.quadrature",
         "error.budget.texels",
+        "error.budget.touching",
         "frames.seconds",
         "image.height",
         "image.width",

@@ -77,6 +77,8 @@ properties! { $
         uniform_cube_in_perspective
         uniform_cube_orthographic
         linear_ramp_is_the_closed_form
+        a_bent_field_has_its_mean
+        values_at_a_weak_step_are_above_it
         color_ramp_matches_the_march
         no_extinction_shows_the_background
         extinction_of_1e_minus_30_changes_nothing

@@ -73,6 +73,40 @@ pub fn linear_ramp_is_the_closed_form(backend: &mut dyn Backend) {
     }
 }
 
+/// A parabola along every ray, in matter so thin that straight pieces will do: they have its mean all the same. Straight
+/// to the middle of the field, they would be off by 9e-4.
+pub fn a_bent_field_has_its_mean(backend: &mut dyn Backend) {
+    let volume = Volume::new([5, 5, 2], DVec3::ONE, Storage::F32, |p| p.x * p.y / 16.0);
+    let tf = transfer(&[[0.0, 0.9, 0.8, 0.3, 0.0], [1.0, 0.9, 0.8, 0.3, 0.1]], 1.0);
+    for azimuth in [135.0, 315.0] {
+        let camera = Camera::fitted(volume.extent(), azimuth, 0.0, 1.0, true);
+        let expected = march_volume(&volume, &tf, 256.0, &camera, SIZE, BACKGROUND_F64);
+        assert_shows_something("bent field", &expected, BACKGROUND_F64);
+        let image = draw(backend, &volume, &tf, &camera, SIZE);
+        assert_close(&format!("bent field from {azimuth}"), &image, &expected, 1e-4, 3e-5);
+    }
+}
+
+/// Whole numbers at a step so weak that the table is read: they belong to what is above it. On the other side they would
+/// be off by .03.
+pub fn values_at_a_weak_step_are_above_it(backend: &mut dyn Backend) {
+    let volume = Volume::new([21, 17, 25], DVec3::ONE, Storage::plain(TexelType::U8), |p| match p.x {
+        x if x < 3.0 => 1.0,
+        x if x < 17.0 => 2.0,
+        _ => 4.0,
+    });
+    let stepping_at = |step: f64| {
+        let point = |value, opacity| [value, 0.9, 0.8, 0.3, opacity];
+        transfer(&[point(1.0, 0.01), point(step, 0.01), point(step, 0.014), point(4.0, 0.014)], 1.0)
+    };
+    let camera = Camera::fitted(volume.extent(), 80.0, 10.0, 1.0, false);
+    // The march's own values are rounded, to either side.
+    let expected = march_volume(&volume, &stepping_at(2.0 - 1e-9), 64.0, &camera, SIZE, BACKGROUND_F64);
+    assert_shows_something("weak step", &expected, BACKGROUND_F64);
+    let image = draw(backend, &volume, &stepping_at(2.0), &camera, SIZE);
+    assert_close("weak step", &image, &expected, 2e-3, 1e-3);
+}
+
 /// A ramp whose colour changes along the ray: front colours hide those behind.
 pub fn color_ramp_matches_the_march(backend: &mut dyn Backend) {
     let volume = Volume::new([12, 14, 33], DVec3::ONE, Storage::F32, |p| (p.z / 32.0 + p.x * 0.01).min(1.1));

@@ -242,7 +242,8 @@ pub fn pictures_in_parts_are_the_same(backend: &mut dyn Backend) {
                 let least = |doubt: f32| doubt * (1.0 - 1e-4);
                 assert!(
                     doubts.is_none_or(|(found, whole)| found.cells >= least(whole.cells)
-                        && found.table_way >= least(whole.table_way)),
+                        && found.table_way >= least(whole.table_way)
+                        && found.touching >= least(whole.touching)),
                     "{what}: {doubts:?}, expected no less than of the whole"
                 );
             }

@@ -80,13 +80,20 @@ pub struct RayDoubt {
     /// The way through cells that were read from the table of the transfer function, in unit lengths, each stretch as a
     /// share of the light that comes through: what rounding to bins can act on.
     pub table_way: f32,
+    /// What matter may change in a channel where a field comes to rest so near to a step of the transfer function that
+    /// rounding says on which side it is.
+    pub touching: f32,
 }
 
 impl RayDoubt {
     /// The larger of each number.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
-        Self { cells: self.cells.max(other.cells), table_way: self.table_way.max(other.table_way) }
+        Self {
+            cells: self.cells.max(other.cells),
+            table_way: self.table_way.max(other.table_way),
+            touching: self.touching.max(other.touching),
+        }
     }
 }
 

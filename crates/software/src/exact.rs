@@ -16,7 +16,9 @@
 //! places in the cell.
 //!
 //! # Error
-//! At most [`EXACT_DOUBT`] of the light that the cell takes, and mostly a hundredth of that: from quadrature near poles
+//! Where the field comes to rest at an edge between bands, as near as rounding ([`PLACE_ROUNDING`]), it may be on the other
+//! side. What that would change is added up apart ([`Light::touching`]): for a step that a turn touches, a short way; in
+//! front of an opaque band all of the light. Elsewhere at most [`EXACT_DOUBT`] of the light that the cell takes, and mostly a hundredth of that: from quadrature near poles
 //! and in deep, coloured intervals (test `cells_of_every_kind_are_those_of_the_reference`).
 
 use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*};
@@ -40,6 +42,9 @@ const MIN_TINT: f32 = 1e-3;
 
 /// What a channel may be off by, as a share of the light that a cell takes: above all that was found in a test.
 pub(crate) const EXACT_DOUBT: f32 = 0.0025;
+
+/// How exactly a place in a cell is known, in cells: what a field is off by, as a share of the range of the corners.
+const PLACE_ROUNDING: f32 = 1e-5;
 
 /// Of an extinction without end.
 const OPAQUE: f32 = 1e30;
@@ -125,6 +130,12 @@ impl<S: Simd> Row<S> {
         let is_flat = self.opacity_slope.simd_eq(0.0);
         let least = is_flat.select(f32x16::splat(simd, 1e-37), f32x16::splat(simd, f32::EPSILON / 4.0));
         clear_log(simd, opacity, clearness.max(least))
+    }
+
+    /// The extinction at `u` as that of a whole stretch; without end in an opaque band.
+    #[inline(always)]
+    fn whole_extinction(&self, simd: S, u: f32x16<S>) -> f32x16<S> {
+        self.is_opaque().select(f32x16::splat(simd, OPAQUE), self.extinction(simd, u))
     }
 
     /// Whether a band is opaque throughout.
@@ -228,6 +239,8 @@ struct Course<S: Simd> {
     /// Of the corners, and the texel at the end of the cell, from the origin of texels.
     range: [f32x16<S>; 2],
     last: f32x16<S>,
+    /// What the field may be off by; 0 where it is constant.
+    rounding: f32x16<S>,
     is_huge: mask32x16<S>,
     band: i32x16<S>,
     row: Row<S>,
@@ -270,6 +283,10 @@ impl<S: Simd> Course<S> {
         );
         cubic[0] = first;
         let steepest = cubic[1].abs() + cubic[2].abs() * 2.0 + cubic[3].abs() * 3.0;
+        let reach = range[1] - range[0];
+        let digits = range[0].abs().max(range[1].abs()) * f32::EPSILON;
+        let rounding =
+            reach.simd_gt(zero).select(reach.mul_add(f32x16::splat(simd, PLACE_ROUNDING), digits), zero);
         let turns = turns(simd, &cubic);
         let band = bands.find(simd, cubic[0]);
         let row = bands.rows(simd, band);
@@ -280,6 +297,7 @@ impl<S: Simd> Course<S> {
             steepest,
             range,
             last,
+            rounding,
             is_huge,
             band,
             row,
@@ -373,8 +391,7 @@ impl<S: Simd> Course<S> {
 
     #[inline(always)]
     fn depth_per_width(&self, simd: S, u: f32x16<S>) -> f32x16<S> {
-        let opaque = f32x16::splat(simd, OPAQUE);
-        self.row.is_opaque().select(opaque, self.row.extinction(simd, u)) * self.length
+        self.row.whole_extinction(simd, u) * self.length
     }
 
     /// The light of an interval.
@@ -425,6 +442,50 @@ impl<S: Simd> Course<S> {
         light.transmittance -= light.transmittance * opacity_of_depth(simd, depth);
     }
 
+    /// What the neighbouring band would change where the field comes to rest at it, within rounding.
+    #[inline(always)]
+    fn touch(&self, simd: S, bands: Bands<'_>, interval: &Interval<S>, light: &mut Light<S>) {
+        let (row, rounding, u) = (&self.row, self.rounding, interval.target);
+        let is_low = (u - row.low).abs().simd_le(rounding);
+        let is_near = is_low | (u - row.high).abs().simd_le(rounding);
+        let ends = self.active & !interval.crosses & !interval.is_cut & rounding.simd_gt(0.0);
+        if (ends & is_near).all_false() {
+            return;
+        }
+        let slope = slope_at(&self.cubic, interval.width).abs();
+        let curve = (self.cubic[3] * 3.0).mul_add(interval.width, self.cubic[2]).abs();
+        // A parabola at its turn; one that goes on steeper than this is past the edge at once.
+        let square = curve * rounding * 8.0;
+        let rests = (slope * slope).simd_le(square) | slope.simd_le(rounding * 2.0);
+        let lanes = ends & is_near & rests;
+        if lanes.all_false() {
+            return;
+        }
+        let way = rounding * 8.0 / (slope + (slope * slope + square).sqrt());
+        let length = self.length * way.min(f32x16::splat(simd, 1.0));
+        let one = i32x16::splat(simd, 1);
+        let beside = lanes.select(is_low.select(self.band - one, self.band + one), self.band);
+        let other = bands.rows(simd, beside);
+        // As far behind the edge as rounding may take the field: all of a spike that is narrower.
+        let [edge, behind] =
+            [is_low.select(row.low, row.high), is_low.select(other.high - rounding, other.low + rounding)];
+        let behind = behind.max(other.low).min(other.high);
+        let (here, there) = (row.whole_extinction(simd, edge), other.whole_extinction(simd, behind));
+        let [r, g, b] = axes(
+            #[inline(always)]
+            |i| {
+                let [here, there] = [(row, edge), (&other, behind)].map(
+                    #[inline(always)]
+                    |(row, u)| row.color_slope[i].mul_add(u, row.color[i]),
+                );
+                (here - there).abs()
+            },
+        );
+        let change = r.max(g).max(b).mul_add(here.min(there), (here - there).abs());
+        let seen = light.transmittance * opacity_of_depth(simd, change * length);
+        light.touching += lanes.select(seen, f32x16::splat(simd, 0.0));
+    }
+
     /// Takes the lanes to the end of an interval.
     #[inline(always)]
     fn advance(&mut self, simd: S, bands: Bands<'_>, interval: &Interval<S>) {
@@ -471,6 +532,7 @@ fn follow<S: Simd>(simd: S, bands: Bands<'_>, field: &Field<S>, lanes: mask32x16
             return;
         }
         let interval = course.next(simd);
+        course.touch(simd, bands, &interval, light);
         course.add(simd, &interval, light);
         course.advance(simd, bands, &interval);
         course.active &= light.transmittance.simd_gt(MIN_TRANSMITTANCE);

@@ -42,6 +42,7 @@
 //! (`sheets`). No `unsafe`.
 
 mod brick;
+mod cell;
 mod cubes;
 mod exact;
 mod math;

@@ -28,7 +28,7 @@ const NUM_PIXELS: usize = (TILE * TILE) as usize;
 pub(crate) type Light = [[f32; 16]; 4];
 
 /// The numbers of a [`RayDoubt`] of a packet's rays.
-pub(crate) type Doubt = [[f32; 16]; 2];
+pub(crate) type Doubt = [[f32; 16]; 3];
 
 /// Red, green, blue and transmittance of the pixels of a tile, row by row.
 pub(crate) type Rows = [[f32; 4]; NUM_PIXELS];
@@ -75,7 +75,7 @@ impl Tile {
         self.light();
         let Self { light, doubts } = self;
         let light = light.get_or_insert_with(|| Box::new([[[0.0; 16]; 4]; NUM_PACKETS]));
-        (light, doubts.get_or_insert_with(|| Box::new([[[0.0; 16]; 2]; NUM_PACKETS])))
+        (light, doubts.get_or_insert_with(|| Box::new([[[0.0; 16]; 3]; NUM_PACKETS])))
     }
 
     /// The pixels row by row.
@@ -105,7 +105,7 @@ impl Tile {
             let packets = self.doubts.iter().flat_map(|doubts| doubts.iter());
             packets.flat_map(|doubt| doubt[number]).fold(0.0, f32::max)
         };
-        RayDoubt { cells: worst(0), table_way: worst(1) }
+        RayDoubt { cells: worst(0), table_way: worst(1), touching: worst(2) }
     }
 }
 

@@ -207,6 +207,7 @@ fn draw_packet<S: Simd, T: Texel>(
         transmittance: f32x16::from_slice(simd, &gathered[3]),
         doubt: f32x16::from_slice(simd, &doubts[0]),
         table_way: f32x16::from_slice(simd, &doubts[1]),
+        touching: f32x16::from_slice(simd, &doubts[2]),
     };
     let mut wanted = light.transmittance.simd_gt(MIN_TRANSMITTANCE);
     for drawable in drawables {
@@ -229,5 +230,5 @@ fn draw_packet<S: Simd, T: Texel>(
     }
     let [r, g, b] = light.color.map(Into::into);
     *gathered = [r, g, b, light.transmittance.into()];
-    *doubts = [light.doubt.into(), light.table_way.into()];
+    *doubts = [light.doubt.into(), light.table_way.into(), light.touching.into()];
 }

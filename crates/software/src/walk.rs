@@ -13,6 +13,7 @@ use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::Occupancy;
+use crate::cell::{Cell, balanced, mean_distance};
 use crate::exact::{Bands, EXACT_DOUBT, Field, add_cells};
 use crate::math::{axes, four, front_weight, opacity_of_depth, transpose};
 use crate::packet::Span;
@@ -20,6 +21,9 @@ use crate::texel::Texel;
 
 /// The largest doubt of a cell, as a difference of a colour channel. Four pieces have a quarter of that of two.
 const MAX_DOUBT: f32 = 0.002;
+
+/// Changes of the table's sums below this are none: their inverse might not be finite.
+const INVISIBLE: f32 = 1e-30;
 
 /// Light gathered so far.
 pub(crate) struct Light<S: Simd> {
@@ -30,6 +34,8 @@ pub(crate) struct Light<S: Simd> {
     /// The way through cells that were read from the table, in unit lengths, as it is seen: each stretch as a share of
     /// the light that comes through.
     pub(crate) table_way: f32x16<S>,
+    /// What a channel may be off by where rounding says on which side of a step the field is.
+    pub(crate) touching: f32x16<S>,
 }
 
 /// A brick with all that a packet needs of it.
@@ -80,9 +86,9 @@ impl Table<'_> {
     fn end<S: Simd>(&self, simd: S, texel: f32x16<S>, from: f32x16<S>) -> End<S> {
         let bin = self.bin(simd, texel);
         let entry = self.entry(simd, bin);
-        // Two ends in one bin count as one whole bin: 2k goes with 2k + 1.
+        // Two ends at one edge count as the whole bin above it: values are on the upper side of a step.
         let is_flat = bin.simd_eq(from);
-        let other = is_flat.select(entry ^ 1, entry);
+        let other = is_flat.select(entry + 1, entry);
         let aside: f32x16<S> = (other - entry).to_float();
         End { bin: bin + aside, integrals: self.integrals(simd, other) }
     }
@@ -114,30 +120,43 @@ impl<S: Simd> Light<S> {
     #[cfg(test)]
     pub(crate) fn none(simd: S) -> Self {
         let zero = f32x16::splat(simd, 0.0);
-        Self { color: [zero; 3], transmittance: f32x16::splat(simd, 1.0), doubt: zero, table_way: zero }
+        let transmittance = f32x16::splat(simd, 1.0);
+        Self { color: [zero; 3], transmittance, doubt: zero, table_way: zero, touching: zero }
     }
 
     /// Adds two neighbouring pieces of one length in `lanes`. What their mean colours differ by tells how the colour
     /// runs within each, so how much more of its front is seen than of its back.
     #[inline(always)]
     fn add(&mut self, simd: S, pieces: &[Piece<S>; 2], lanes: mask32x16<S>) {
+        let [a, b] = [0, 1].map(
+            #[inline(always)]
+            |i| lanes.select(pieces[i].depth, f32x16::splat(simd, 0.0)),
+        );
+        let (thin, thick) = (a.min(b), a.max(b).max(f32x16::splat(simd, INVISIBLE)));
+        let ([weight_a, divisor_a], [weight_b, divisor_b]) = (front_weight(simd, a), front_weight(simd, b));
+        // One division for three.
+        let inverse = 1.0 / (divisor_a * divisor_b * thick);
         // Where one piece is much thinner than the other, its colour tells little of the other's.
-        let (a, b) = (pieces[0].depth, pieces[1].depth);
-        let (thin, thick) = (a.min(b), a.max(b));
-        let trust = thick.simd_gt(0.0).select(thin / thick, f32x16::splat(simd, 0.0));
+        let trust = thin * (divisor_a * divisor_b) * inverse;
         let slope = axes(
             #[inline(always)]
             |i| (pieces[1].color(i) - pieces[0].color(i)) * trust,
         );
-        self.add_piece(simd, &pieces[0], &slope, lanes);
-        self.add_piece(simd, &pieces[1], &slope, lanes);
+        let thick = inverse * thick;
+        self.add_piece(simd, (&pieces[0], a), &slope, weight_a * divisor_b * thick);
+        self.add_piece(simd, (&pieces[1], b), &slope, weight_b * divisor_a * thick);
     }
 
+    /// Adds a piece of some depth, from the mean of whose colour what is seen is off by `shift` of its `slope`.
     #[inline(always)]
-    fn add_piece(&mut self, simd: S, piece: &Piece<S>, slope: &[f32x16<S>; 3], lanes: mask32x16<S>) {
-        let alpha = opacity_of_depth(simd, lanes.select(piece.depth, f32x16::splat(simd, 0.0)));
-        let light = self.transmittance * alpha;
-        let shift = front_weight(simd, piece.depth);
+    fn add_piece(
+        &mut self,
+        simd: S,
+        (piece, depth): (&Piece<S>, f32x16<S>),
+        slope: &[f32x16<S>; 3],
+        shift: f32x16<S>,
+    ) {
+        let light = self.transmittance * opacity_of_depth(simd, depth);
         self.color = axes(
             #[inline(always)]
             |i| light.mul_add(piece.color(i) - slope[i] * shift, self.color[i]),
@@ -201,9 +220,13 @@ impl<S: Simd> Piece<S> {
             #[inline(always)]
             |i| to.integrals[i] - from.integrals[i],
         );
-        let inverse = extinction.simd_ne(0.0).select(1.0 / extinction, f32x16::splat(simd, 0.0));
-        // So far beyond the table that two ends are one there is nothing.
-        let depth = bins.simd_ne(0.0).select(length * extinction / bins, f32x16::splat(simd, 0.0));
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        // So far beyond the table that two ends are one there is nothing; nor is there in a blank, which is no number.
+        let is_seen = extinction.abs().simd_gt(INVISIBLE) & bins.abs().simd_gt(0.0);
+        // One division for two.
+        let quotient = 1.0 / is_seen.select(bins * extinction, one);
+        let inverse = is_seen.select(bins * quotient, zero);
+        let depth = is_seen.select(length * extinction * (extinction * quotient), zero);
         Self { light: [r, g, b], inverse, depth }
     }
 
@@ -349,100 +372,6 @@ impl<'a, S: Simd> Walker<'a, S> {
     }
 }
 
-/// A cell's field.
-struct Cell<S: Simd> {
-    /// At x = 0: the corners (y, z) = (0, 0), (1, 0), (0, 1), (1, 1).
-    low: [f32x16<S>; 4],
-    /// What x = 1 adds.
-    slope: [f32x16<S>; 4],
-}
-
-impl<S: Simd> Cell<S> {
-    #[inline(always)]
-    fn new(corners: [f32x16<S>; 8], texel_origin: f32) -> Self {
-        let low = four(
-            #[inline(always)]
-            |i| corners[2 * i] - texel_origin,
-        );
-        let slope = four(
-            #[inline(always)]
-            |i| corners[2 * i + 1] - corners[2 * i],
-        );
-        Self { low, slope }
-    }
-
-    #[inline(always)]
-    fn value(&self, [x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
-        let [a, b, c, d] = four(
-            #[inline(always)]
-            |i| self.slope[i].mul_add(x, self.low[i]),
-        );
-        let near = (b - a).mul_add(y, a);
-        let far = (d - c).mul_add(y, c);
-        (far - near).mul_add(z, near)
-    }
-
-    /// The field on the straight way from one place in the cell to another, by powers of the share of the way.
-    #[inline(always)]
-    fn along(&self, from: [f32x16<S>; 3], to: [f32x16<S>; 3]) -> [f32x16<S>; 4] {
-        let [dx, dy, dz] = axes(
-            #[inline(always)]
-            |axis| to[axis] - from[axis],
-        );
-        let [x, y, z] = from;
-        let line = four(
-            #[inline(always)]
-            |i| [self.slope[i].mul_add(x, self.low[i]), self.slope[i] * dx],
-        );
-        // A line in y between two lines in x: a parabola; so once more in z.
-        let [near, far] = [0, 2].map(
-            #[inline(always)]
-            |i| {
-                let [a, b] = [line[i], line[i + 1]];
-                let (start, slope) = (b[0] - a[0], b[1] - a[1]);
-                [start.mul_add(y, a[0]), slope.mul_add(y, a[1]) + start * dy, slope * dy]
-            },
-        );
-        let [a, b, c] = axes(
-            #[inline(always)]
-            |i| far[i] - near[i],
-        );
-        [a.mul_add(z, near[0]), b.mul_add(z, near[1]) + a * dz, c.mul_add(z, near[2]) + b * dz, c * dz]
-    }
-
-    /// The least and the greatest texel.
-    #[inline(always)]
-    fn range(&self) -> [f32x16<S>; 2] {
-        let high = four(
-            #[inline(always)]
-            |i| self.low[i] + self.slope[i],
-        );
-        let [a, b, c, d] = four(
-            #[inline(always)]
-            |i| [self.low[i].min(high[i]), self.low[i].max(high[i])],
-        );
-        [a[0].min(b[0]).min(c[0].min(d[0])), a[1].max(b[1]).max(c[1].max(d[1]))]
-    }
-
-    /// The part of the field that no parabola is: the coefficient of `x y z`.
-    #[inline(always)]
-    fn twist(&self) -> f32x16<S> {
-        let [a, b, c, d] = self.slope;
-        (a - b) - (c - d)
-    }
-}
-
-/// The value for the middle of a cell, so that each of the straight lines to it from the cell's ends has the mean
-/// of the field over its half, to second order: a parabola bulges from its chord by a third of what the middle
-/// must give. Only where the field runs one way, and never past the ends: no value appears that is not there.
-#[inline(always)]
-fn balanced<S: Simd>(first: f32x16<S>, middle: f32x16<S>, last: f32x16<S>) -> f32x16<S> {
-    let (low, high) = (first.min(last), first.max(last));
-    let moved = (middle * 8.0 - first - last) * (1.0 / 6.0);
-    let one_way = middle.simd_ge(low) & middle.simd_le(high);
-    one_way.select(moved.max(low).min(high), middle)
-}
-
 /// The way of the lanes through their cells: from where they stand to `end`, in unit lengths, `half` of it, and the texel
 /// at its start, in its middle and at its end.
 struct Stretch<S: Simd> {
@@ -464,9 +393,12 @@ fn add_cell<S: Simd>(
 ) -> End<S> {
     let zero = f32x16::splat(simd, 0.0);
     let Stretch { end, half, values: [first, middle, last] } = *stretch;
-    let bend = (middle + middle - first - last).abs();
+    let over = balanced(first, middle, last);
+    let distance = mean_distance(simd, first, middle, last, over);
     let twist = (cell.twist() * walker.volume(half)).abs();
-    let doubt = (bend * (1.0 / 6.0) + twist * (1.0 / 16.0)) * (table.slope * half) * light.transmittance;
+    let doubt = twist.mul_add(f32x16::splat(simd, 1.0 / 32.0), distance)
+        * (half * (2.0 * table.slope))
+        * light.transmittance;
     let mut exact = exact | (lanes & doubt.simd_gt(4.0 * MAX_DOUBT));
     let near;
     let mut far = None;
@@ -482,7 +414,7 @@ fn add_cell<S: Simd>(
         from = pair.end;
         far = Some(pair.pieces);
     } else {
-        near = Pair::new(simd, table, from, balanced(first, middle, last), last, half);
+        near = Pair::new(simd, table, from, over, last, half);
         from = near.end;
     }
     let behind = light.transmittance;

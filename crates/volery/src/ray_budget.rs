@@ -5,11 +5,13 @@
 //!
 //! - *Quadrature* and *classification* are sums over the cells that a ray met, taken where the picture is drawn
 //!   ([`RayDoubt`]): the former of what straight pieces in place of the cubic field and mean colours in place of running
-//!   ones may do, the latter of half a bin at the steepest place of the transfer function. Neither counts on errors that
+//!   ones may do, the latter of a bin at the steepest place of the transfer function. Neither counts on errors that
 //!   cancel, though most do: both are far above what is measured.
 //! - *Texels* and *arithmetic* are what rounding to `f32` does to the narrowest band of the transfer function: a shell is
-//!   thicker or thinner by as much, and `x exp(-x)` is at most .37. Where values lie on a step of the transfer function,
-//!   as near as rounding, either side is right for one of two neighbouring fields, and no number can be given.
+//!   thicker or thinner by as much, and `x exp(-x)` is at most .37.
+//! - *Touching*: where a field comes to rest at a step of the transfer function, as near as rounding, either side is right
+//!   for one of two neighbouring fields. What the other side would change, up to 1 in front of an opaque band, is summed
+//!   along each ray.
 //! - *Early stop* is the light behind a ray that ends.
 
 use volery_frame::{RayDoubt, RayTransfer, TexelType, VolumeLayout};
@@ -30,6 +32,8 @@ pub struct RayBudget {
     pub early_stop: f64,
     /// Arithmetic in `f32`.
     pub arithmetic: f64,
+    /// The side of a step of the transfer function that rounding chooses where a field comes to rest at it.
+    pub touching: f64,
     /// The sum of all.
     pub max: f64,
 }
@@ -49,22 +53,24 @@ impl RayBudget {
         let sums = transfer.entries().last().map_or(0.0, |sums| f64::from(sums[3]));
         let cells: f64 = layout.cells.iter().map(|&cells| f64::from(cells)).sum();
         let texels = if layout.texel == TexelType::F32 { rounding.min(1.0) } else { 0.0 };
-        let classification = way * transfer.slope() * 0.5 / bins_per_texel;
+        let classification = way * transfer.rounding();
         let quadrature = f64::from(doubt.cells);
         let arithmetic = (4.0 * rounding).min(1.0) + f64::from(f32::EPSILON) * (way * sums + 2.0 * cells);
-        let max = texels + classification + quadrature + EARLY_STOP + arithmetic;
-        Self { texels, classification, quadrature, early_stop: EARLY_STOP, arithmetic, max }
+        let touching = f64::from(doubt.touching).min(1.0);
+        let max = texels + classification + quadrature + EARLY_STOP + arithmetic + touching;
+        Self { texels, classification, quadrature, early_stop: EARLY_STOP, arithmetic, touching, max }
     }
 
     /// The stages that may add more than a limit, by name.
     pub fn above(&self, limit: f64) -> Vec<(&'static str, f64)> {
-        let Self { texels, classification, quadrature, early_stop, arithmetic, max: _ } = *self;
+        let Self { texels, classification, quadrature, early_stop, arithmetic, touching, max: _ } = *self;
         [
             ("texels", texels),
             ("classification", classification),
             ("quadrature", quadrature),
             ("early stop", early_stop),
             ("arithmetic", arithmetic),
+            ("a step of the transfer function that values touch", touching),
         ]
         .into_iter()
         .filter(|&(_, error)| error > limit)

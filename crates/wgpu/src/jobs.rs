@@ -7,9 +7,9 @@ use volery_frame::{FinishedPart, RayDoubt};
 
 use crate::gpu::{Failure, Gpu};
 
-/// Bytes of two timestamps, and behind them of the two numbers of a [`RayDoubt`].
+/// Bytes of two timestamps, and behind them of the three numbers of a [`RayDoubt`].
 const STAMP_BYTES: u64 = 16;
-const DOUBT_BYTES: u64 = 8;
+const DOUBT_BYTES: u64 = 12;
 
 /// The jobs of a picture: one per part and tile, and those before and after the parts.
 #[derive(Default)]
@@ -126,6 +126,7 @@ impl Jobs {
             // Of each ray it is no more than the sum of the largest.
             self.totals.doubt.cells += doubt.cells;
             self.totals.doubt.table_way += doubt.table_way;
+            self.totals.doubt.touching += doubt.touching;
             self.told.extend(part.map(|number| FinishedPart { number, device_seconds: seconds }));
         }
         Ok(())
@@ -183,14 +184,14 @@ impl Slip {
     fn read(&self, gpu: &Gpu) -> Result<Totals, Failure> {
         let view = self.staging.get_mapped_range(..).map_err(|e| Failure::Other(e.to_string()))?;
         let [from, to] = [0, 8].map(|i| u64::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
-        let [cells, table_way] =
-            [16, 20].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
+        let [cells, table_way, touching] =
+            [16, 20, 24].map(|i| f32::from_le_bytes(std::array::from_fn(|byte| view[i + byte])));
         drop(view);
         self.staging.unmap();
         self.is_done.store(false, Ordering::Release);
         let seconds = to.saturating_sub(from) as f64 * f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
         // Ways are depths to the base 2.
-        let doubt = RayDoubt { cells, table_way: table_way * std::f32::consts::LN_2 };
+        let doubt = RayDoubt { cells, table_way: table_way * std::f32::consts::LN_2, touching };
         Ok(Totals { device_seconds: self.stamps.is_some().then_some(seconds), doubt })
     }
 }

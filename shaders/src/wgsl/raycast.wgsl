@@ -122,8 +122,8 @@ const CELLS_MASK: u32 = 1023;
 // [blue, red slope, green slope, blue slope]. A texel's place in one is its distance u from the base; it holds those
 // from low to high. Opacity is per unit distance, clearness what is missing to 1; slopes are per texel.
 @group(0) @binding(7) var<storage, read> bands: array<vec4f>;
-// The largest doubt of any ray, and the longest way through cells that were read from the table: bits of numbers of at
-// least 0, which are in order as the numbers are.
+// The largest doubt of any ray, the longest way through cells that were read from the table, and the most that touched
+// steps may change: bits of numbers of at least 0, which are in order as the numbers are.
 @group(0) @binding(8) var<storage, read_write> worst: array<atomic<u32>>;
 // A bit per slot, set where its brick is of this part.
 @group(0) @binding(9) var<storage, read> chosen: array<u32>;
@@ -151,6 +151,8 @@ struct Light {
     // depth to the base 2 of matter that has depth 1 per unit length, as it is seen.
     doubt: f32,
     table_way: f32,
+    // What a channel may be off by where rounding says on which side of a step the field is.
+    touching: f32,
 }
 
 // One end of a piece of ray: the texel, its bin, and the antiderivatives there.
@@ -274,12 +276,20 @@ fn balanced(first: f32, middle: f32, last: f32) -> f32 {
     return select(middle, clamp(moved, low, high), middle >= low && middle <= high);
 }
 
+// How far the two straight lines over a balanced middle are from the field, a parabola, in the mean.
+fn mean_distance(first: f32, middle: f32, last: f32, moved: f32) -> f32 {
+    let bend = 2.0 * middle - first - last;
+    // A sixth of the bend takes a middle where it is in balance.
+    let is_balanced = abs(6.0 * (moved - middle) - bend) <= 0.01 * abs(bend);
+    return abs(bend) * select(1.0 / 12.0, 4.0 / 81.0, is_balanced);
+}
+
 fn piece_to(from_end: End, texel: f32, depth_scale: f32) -> Piece {
     let bin = bin_of(texel);
     let is_flat = bin == from_end.bin;
     let entry = i32(clamp(bin, 0.0, frame.last_entry));
-    // Two ends in one bin count as one whole bin.
-    let other = select(entry, entry ^ 1, is_flat);
+    // Two ends at one edge count as the whole bin above it: values are on the upper side of a step.
+    let other = select(entry, entry + 1, is_flat);
     let sums = textureLoad(transfer, vec2i(other, 0), 0);
     let change = sums - from_end.sums;
     // One division for two: by the bins passed and by the change of depth.
@@ -291,15 +301,21 @@ fn piece_to(from_end: End, texel: f32, depth_scale: f32) -> Piece {
 }
 
 // How far the light of a piece is from that of its mean colour, as a share of the change of colour along it:
-// `1/2 - 1/x + 1/(exp(x) - 1)` of the optical depth x.
-fn front_weight(depth: f32) -> f32 {
+// `1/2 - 1/x + 1/(exp(x) - 1)` of the optical depth x. As numerator and denominator.
+fn front_weight(depth: f32) -> vec2f {
     let x = min(depth * 0.6931472, 8.0);
-    return x / (0.2 * x * x + 12.0);
+    return vec2f(x, 0.2 * x * x + 12.0);
 }
 
 fn add_pair(light: ptr<function, Light>, a: Piece, b: Piece) {
+    let weight_a = front_weight(a.depth);
+    let weight_b = front_weight(b.depth);
+    let thick = max(max(a.depth, b.depth), INVISIBLE);
+    let divisors = weight_a.y * weight_b.y;
+    // One division for three.
+    let inverse = 1.0 / (divisors * thick);
     // Where one piece is much thinner than the other, its colour tells little of the other's.
-    let slope = (min(a.depth, b.depth) / max(max(a.depth, b.depth), INVISIBLE)) * (b.color - a.color);
+    let slope = (min(a.depth, b.depth) * divisors * inverse) * (b.color - a.color);
     let middle_depth = (*light).depth + a.depth;
     let depth = middle_depth + b.depth;
     let middle = exp2(-middle_depth);
@@ -307,16 +323,16 @@ fn add_pair(light: ptr<function, Light>, a: Piece, b: Piece) {
     // The differences of transmittance add up to exactly what is missing behind.
     let share_a = (*light).transmittance - middle;
     let share_b = middle - transmittance;
-    let shift = share_a * front_weight(a.depth) + share_b * front_weight(b.depth);
+    let shift = (share_a * weight_a.x * weight_b.y + share_b * weight_b.x * weight_a.y) * thick * inverse;
     (*light).color += share_a * a.color + share_b * b.color - shift * slope;
     (*light).depth = depth;
     (*light).transmittance = transmittance;
 }
 
 // What straight pieces in place of the field may be off by, per depth of half the way.
-fn doubt_of_field(corners: Corners, bend: f32, way: vec3f) -> f32 {
+fn doubt_of_field(corners: Corners, distance: f32, way: vec3f) -> f32 {
     let twist = abs(corners.rise.w - corners.rise.z - corners.rise.x + corners.rise.y) * abs(way.x * way.y * way.z);
-    return (bend * (1.0 / 6.0) + twist * (1.0 / 16.0)) * frame.slope;
+    return (2.0 * distance + twist * (1.0 / 16.0)) * frame.slope;
 }
 
 // The share of a stretch whose doubt is good: it falls with the third power.
@@ -342,7 +358,7 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
     let t_end = min(smallest(last_faces), ray.end);
     // The finest cell that the ray is in.
     var place = clamp(floor(ray.start + t * ray.direction), vec3f(0.0), frame.cells - 1.0);
-    var light = Light(before.rgb, select(-log2(before.a), 0.0, before.a == 1.0), before.a, 0.0, 0.0);
+    var light = Light(before.rgb, select(-log2(before.a), 0.0, before.a == 1.0), before.a, 0.0, 0.0, 0.0);
     // The texel at t, where the cell before was of the same level; its level, or none.
     var end = End(0.0, 0.0, vec4f(0.0));
     var end_level = NO_LEVEL;
@@ -383,18 +399,20 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let is_exact = HAS_EXACT && light_behind > 0.0 && (words.y & EXACT) != 0u;
         var middle = texel_at(corners, (origin + 0.5 * (t + t_far) * ray.direction) * inverse_scale);
         var last = texel_at(corners, (origin + t_far * ray.direction) * inverse_scale);
-        let bend = abs(2.0 * middle - end.texel - last);
+        var over = balanced(end.texel, middle, last);
+        let distance = mean_distance(end.texel, middle, last, over);
         let way = (t_far - t) * inverse_scale * ray.motion;
-        var doubt = doubt_of_field(corners, bend, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
+        var doubt = doubt_of_field(corners, distance, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
         var t_next = t_far;
         if doubt > MAX_DOUBT && !is_exact {
             t_next = min(t + max(good_share(doubt) * (t_far - t), MIN_STRETCH * scale), t_far);
             middle = texel_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) * inverse_scale);
             last = texel_at(corners, (origin + t_next * ray.direction) * inverse_scale);
+            over = balanced(end.texel, middle, last);
             doubt = min(doubt, MAX_DOUBT);
         }
         let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);
-        let a = piece_to(end, balanced(end.texel, middle, last), depth);
+        let a = piece_to(end, over, depth);
         let b = piece_to(a.end, last, depth);
         let color_doubt = doubt_of_color(a, b) * light_behind;
         if color_doubt > MAX_DOUBT && !is_exact && t_next - t > MIN_STRETCH * scale {
@@ -443,5 +461,6 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let light = light_along(ray_of_pixel(pixel), before);
     atomicMax(&worst[0], bitcast<u32>(light.doubt));
     atomicMax(&worst[1], bitcast<u32>(light.table_way));
+    atomicMax(&worst[2], bitcast<u32>(light.touching));
     gathered[index] = vec4f(light.color, light.transmittance);
 }

@@ -101,18 +101,22 @@ impl Attack {
         self.measured.sort_by(|a, b| b.2.max.total_cmp(&a.2.max));
         println!("\nworst of {}:", self.name);
         for (index, families, measured) in self.measured.iter().take(worst) {
-            let stated = measured.stated.map_or(String::new(), |stated| format!(", stated {stated:.2e}"));
-            println!(
-                "scene {index}: max {:.2e}, rmse {:.2e}{stated}; {families}",
-                measured.max, measured.rmse
-            );
+            print_line(*index, families, measured);
             if let Some(folder) = save {
                 std::fs::create_dir_all(folder)?;
                 save::save(&Scene::random(seed, *index), &format!("seed_{seed}_scene_{index}"), folder)?;
             }
         }
+        println!("\nfarther from the truth than stated, of {}:", self.name);
+        for (index, families, measured) in self.measured.iter().filter(|(.., m)| m.is_understated()) {
+            print_line(*index, families, measured);
+        }
         Ok(())
     }
+}
+
+fn print_line(index: u64, families: &str, Measured { max, rmse, stated, .. }: &Measured) {
+    println!("scene {index}: max {max:.2e}, rmse {rmse:.2e}, stated {stated:.2e}; {families}");
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -6,25 +6,13 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use volery::{Camera, ControlPoint, TransferFunction};
-use volery_data::hash;
+use volery_data::{fill, hash};
 
 mod invariances;
 mod kinds;
 
 /// In front of it all three channels of matter and of the background differ.
 const BACKGROUND: [f64; 3] = [0.1, 0.5, 0.9];
-
-/// One sample per grid point, x fastest, of its index along each axis.
-fn filled<T>(dims: [usize; 3], mut sample: impl FnMut([usize; 3]) -> T) -> Vec<T> {
-    let [nx, ny, nz] = dims;
-    let mut samples = Vec::with_capacity(nx * ny * nz);
-    for z in 0..nz {
-        for y in 0..ny {
-            samples.extend((0..nx).map(|x| sample([x, y, z])));
-        }
-    }
-    samples
-}
 
 /// A smooth field in [0, 1] without symmetry, a wave about every twelve samples.
 fn wave([x, y, z]: [usize; 3]) -> f64 {

@@ -5,8 +5,8 @@
 //! `∫ s dt = L * (S(w1) - S(w0)) / (w1 - w0)` with `S` the antiderivative of the extinction, and likewise for the
 //! premultiplied colour `c s`. This is pre-integration (Engel, Kraus, Ertl 2001) reduced to one dimension: exact for
 //! the optical depth of a piece of any length, in one look-up per end of a piece, and rebuilt in microseconds. `S` is
-//! tabled over *bins* of texels and read at the nearest edge of a bin; two ends at one edge count as a piece over one
-//! whole bin.
+//! tabled over *bins* of texels and read at the nearest edge of a bin; two ends at one edge count as a piece over the
+//! whole bin above it.
 //!
 //! A table is right where the transfer function is nearly constant within a bin and a cell holds little optical depth.
 //! Nothing says that it is: bands of opacity may be narrower than a bin, or opaque. So each bin knows how much a cell
@@ -23,7 +23,8 @@
 //! digits that matter: exactly for integers, and to `2^-24` of a difference for others.
 //!
 //! # Error
-//! - *Rounding to bins*: half a bin at each end of a piece. Bins in which extinction or premultiplied colour vary, with
+//! - *Rounding to bins*: half a bin at each end of a piece, a whole one where both are at one edge; see
+//!   [`RayTransfer::rounding`]. Bins in which extinction or premultiplied colour vary, with
 //!   their neighbours, by more than [`MAX_BIN_VARIATION`] per longest chord of a cell are left to the exact way.
 //! - *Sums in f32*: extinction counts up to [`MAX_TABLE_DEPTH`] per chord only (what is denser is never read), so the
 //!   extinction of one bin is off by at most `2^-23 * MAX_BINS * MAX_TABLE_DEPTH` = .001 per chord.
@@ -99,6 +100,7 @@ pub struct RayTransfer {
     /// Per bin: one over the longest chord, in unit lengths, for which the table is good enough.
     hardness: Vec<f32>,
     slope: f64,
+    rounding: f64,
     unit_length: f64,
     depth_scale: f64,
 }
@@ -111,10 +113,24 @@ struct Bin {
     /// Least and greatest in it of [`aspects`].
     range: [[f64; 7]; 2],
     is_visible: bool,
+    /// Whether the transfer function has a kink or a step in it.
+    is_cut: bool,
 }
 
 impl Bin {
-    const CLEAR: Self = Self { sums: [0.0; 4], range: [[0.0; 7]; 2], is_visible: false };
+    const CLEAR: Self = Self { sums: [0.0; 4], range: [[0.0; 7]; 2], is_visible: false, is_cut: false };
+
+    /// The most that any aspect of a value within half a bin of the edge between two differs from the mean of either:
+    /// half of what each varies by, all of it where there is a step, and the step between them.
+    fn rounding(below: &Self, above: &Self) -> f64 {
+        let of = |i: usize| {
+            let [b, a] = [below, above].map(|bin| [bin.range[0][i], bin.range[1][i]]);
+            let gap = (a[0] - b[1]).max(b[0] - a[1]).max(0.0);
+            let share = |bin: &Self| if bin.is_cut { 1.0 } else { 0.5 };
+            gap + share(below) * (b[1] - b[0]) + share(above) * (a[1] - a[0])
+        };
+        (0..7).map(of).fold(0.0, f64::max)
+    }
 
     /// The largest change of any aspect within some bins.
     fn variation(bins: &[Self]) -> f64 {
@@ -192,15 +208,18 @@ impl RayTransfer {
         let is_easy = |bin: &usize| f64::from(hardness[*bin]) * longest_chord <= 1.0;
         let rise = |bin: usize| Bin::variation(&bins[bin..=bin]);
         let slope = (0..bins.len()).filter(is_easy).map(rise).fold(0.0, f64::max) / bin_width;
+        let edges = (1..bins.len()).filter(|above| is_easy(above) && is_easy(&(above - 1)));
+        let rounding = edges.map(|above| Bin::rounding(&bins[above - 1], &bins[above])).fold(0.0, f64::max);
         Self {
             revision: Revision::new(),
             texel_origin,
-            bands: segments.iter().map(|segment| band(segment, texel_origin)).collect(),
+            bands: segments.iter().map(|segment| band(segment, texel_origin, is_whole)).collect(),
             entries: sum_up(&bins),
             bin_from_texel: [1.0 / bin_width, PADDING as f64 - (low - texel_origin) / bin_width],
             visible: BinSet::new(bins.iter().map(|bin| bin.is_visible)),
             hardness,
             slope,
+            rounding,
             unit_length,
             depth_scale,
         }
@@ -258,6 +277,12 @@ impl RayTransfer {
         self.slope
     }
 
+    /// The largest change of extinction, or of a channel of premultiplied colour, that rounding a texel to bins makes in
+    /// bins that are read at the finest level; per unit length.
+    pub fn rounding(&self) -> f64 {
+        self.rounding
+    }
+
     /// A cell whose corners differ by more texels lies beside an outlier: `f32` rounds its field to more than what tells
     /// one thing that can be seen from another.
     pub fn huge_range(&self) -> f64 {
@@ -280,14 +305,16 @@ impl RayTransfer {
     }
 }
 
-/// A segment as executors read it.
-fn band(segment: &Segment, origin: f64) -> Band {
+/// A segment as executors read it. Its base is rounded as texels are: a field that is constant at a control point has its
+/// colour, and that of the right side of a step.
+fn band(segment: &Segment, origin: f64, is_whole: bool) -> Band {
     let [low, high] = segment.ends;
+    let held = |texel: f64| if is_whole { texel } else { f64::from(texel as f32) };
     let is_lowest = low == f64::NEG_INFINITY;
     let width = high - low;
     let slope = |[from, to]: [f64; 2]| if width.is_finite() { ((to - from) / width) as f32 } else { 0.0 };
     Band {
-        base: (if is_lowest { high } else { low } - origin) as f32,
+        base: (held(if is_lowest { high } else { low }) - origin) as f32,
         low: if is_lowest { f32::MIN } else { 0.0 },
         high: if is_lowest { 0.0 } else { width.min(f64::from(f32::MAX)) as f32 },
         opacity: segment.opacity[0] as f32,
@@ -302,7 +329,7 @@ fn band(segment: &Segment, origin: f64) -> Band {
 fn end_bin(segment: &Segment, texel: f64, max_depth: f64, depth_scale: f64) -> Bin {
     let light = segment.light(texel, f64::MAX).map(|x| x * depth_scale);
     let sums = segment.light(texel, max_depth).map(|x| x * depth_scale);
-    Bin { sums, range: [aspects(light); 2], is_visible: light[3] > 0.0 }
+    Bin { sums, range: [aspects(light); 2], is_visible: light[3] > 0.0, is_cut: false }
 }
 
 /// Integral and range over `[from, to]` in texels.
@@ -313,6 +340,7 @@ fn measure(segments: &[Segment], [from, to]: [f64; 2], max_depth: f64, depth_sca
         let (start, end) = (from.max(segment.ends[0]), to.min(segment.ends[1]));
         let (middle, half) = ((start + end) / 2.0, (end - start) / 2.0);
         bin.is_visible |= !segment.is_clear();
+        bin.is_cut |= start > from;
         for texel in [start, end] {
             let aspects = aspects(segment.light(texel, f64::MAX).map(|x| x * depth_scale));
             for (i, aspect) in aspects.into_iter().enumerate() {

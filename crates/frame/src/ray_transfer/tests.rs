@@ -157,6 +157,48 @@ fn bands_are_the_transfer_function() {
     }
 }
 
+/// A field that is constant at a step has the colour above it: texels are rounded, and so are the ends of bands.
+#[test]
+fn a_texel_at_a_control_point_is_in_the_band_above_it() {
+    for third in 1..300 {
+        let value = f64::from(third) / 3.0;
+        let points = [(0.1, 0.5, 0.1), (value, 0.5, 0.2), (value, 0.5, 0.9), (1000.7, 0.5, 0.1)];
+        let table = floats(&points, [0.0, 2000.0]);
+        let texel = value as f32 - table.texel_origin() as f32;
+        let band = table.bands()[1..].partition_point(|band| band.base <= texel);
+        assert_eq!(band, 2, "{value}: texel {texel} in {:?}", table.bands()[band]);
+        assert_eq!(texel - table.bands()[band].base, 0.0);
+    }
+}
+
+/// What the table reads for a value is no farther from the truth than it says: beside kinks, at steps within a bin and
+/// between two.
+#[test]
+fn rounding_to_bins_is_bounded() {
+    let weak_step = [(0.0, 0.5, 0.001), (1.0, 0.5, 0.001), (1.0, 0.5, 0.002), (3.0, 0.5, 0.003)];
+    let whole = RayTransfer::new(&gray(&weak_step), &layout(TexelType::U8, [0.0, 3.0]));
+    let odd_step = [(0.0, 0.5, 0.001), (0.31234, 0.5, 0.001), (0.31234, 0.5, 0.003), (1.0, 0.5, 0.002)];
+    let ramp = [(0.0, 0.2, 0.0), (0.777, 0.9, 0.6), (1.0, 0.1, 0.5)];
+    for (what, table, points, most) in [
+        ("a step between bins", whole, gray(&weak_step), 3.0),
+        ("a step in a bin", floats(&odd_step, [0.0, 1.0]), gray(&odd_step), 1.0),
+        ("a ramp", floats(&ramp, [0.0, 1.0]), gray(&ramp), 1.0),
+    ] {
+        let mut worst = 0.0_f64;
+        for i in 0..40_000 {
+            let value = most * (f64::from(i) + 0.5) / 40_000.0;
+            let edge = bin(&table, value).round_ties_even();
+            let found = f64::from(entry(&table, edge + 1.0)[3]) - f64::from(entry(&table, edge)[3]);
+            worst = worst.max((found - points.extinction(value)).abs());
+        }
+        // The sums are rounded to f32.
+        let sums = f64::from(table.entries()[table.last_entry()][3] * f32::EPSILON);
+        println!("{what}: {worst:.2e}, said {:.2e}", table.rounding());
+        assert!(worst <= table.rounding() + sums, "{what}: {worst} for {}", table.rounding());
+        assert!(worst >= 0.3 * table.rounding(), "{what}: {worst} is far below {}", table.rounding());
+    }
+}
+
 #[test]
 fn texels_may_fall_with_values() {
     let falling = VolumeLayout { value_scale: -2.0, value_offset: 3.0, ..layout(TexelType::F32, [0.0, 3.0]) };

@@ -7,6 +7,8 @@ const MIN_CLEARNESS: f32 = 1e-3;
 // Largest optical depth of an interval along which the colour changes, by at least so much in a channel.
 const MAX_INTERVAL_DEPTH: f32 = 1.0;
 const MIN_TINT: f32 = 1e-3;
+// How exactly a place in a cell is known, in cells: what a field is off by, as a share of the range of the corners.
+const PLACE_ROUNDING: f32 = 1e-5;
 // Of an extinction without end.
 const OPAQUE: f32 = 1e30;
 
@@ -161,6 +163,31 @@ fn add_interval(light: ptr<function, Light>, band: Band, cubic: vec4f, width: f3
     }
 }
 
+// Adds what the neighbouring band would change where the field comes to rest at `u`, within rounding at the edge of its
+// band. `index` is the band's.
+fn touch(light: ptr<function, Light>, index: u32, cubic: vec4f, width: f32, u: f32, rounding: f32, length: f32) {
+    let band = band_at(index);
+    let is_low = abs(u - band.low) <= rounding;
+    let slope = abs(cubic_slope(cubic, width));
+    let curve = abs(3.0 * cubic.w * width + cubic.z);
+    // A parabola at its turn; one that goes on steeper than this is past the edge at once.
+    let square = 8.0 * curve * rounding;
+    let rests = slope * slope <= square || slope <= 2.0 * rounding;
+    if !rests || !(is_low || abs(u - band.high) <= rounding) {
+        return;
+    }
+    let way = min(8.0 * rounding / max(slope + sqrt(slope * slope + square), 1e-30), 1.0);
+    let other = band_at(select(index + 1u, index - 1u, is_low));
+    let edge = select(band.high, band.low, is_low);
+    // As far behind the edge as rounding may take the field: all of a spike that is narrower.
+    let behind = clamp(select(other.low + rounding, other.high - rounding, is_low), other.low, other.high);
+    let here = extinction_at(band, edge);
+    let there = extinction_at(other, behind);
+    let tint = largest(abs(band.color + band.color_slope * edge - other.color - other.color_slope * behind));
+    let depth = (abs(here - there) + tint * min(here, there)) * length * way;
+    (*light).touching += (*light).transmittance * (1.0 - exp2(-min(depth, 60.0)));
+}
+
 // The width of an interval, or of a part of it where it is deep and coloured.
 fn shallow_width(band: Band, cubic: vec4f, width: f32, goal: f32, length: f32) -> f32 {
     let first = extinction_at(band, cubic.x) * length;
@@ -186,6 +213,10 @@ fn add_exactly(light: ptr<function, Light>, field: vec4f, ends: vec2f, range: ve
     let first = clamp(select(field.x, ends.x, is_huge), range.x, range.y);
     let last = clamp(ends.y, range.x, range.y);
     let whole = vec4f(first, field.yzw);
+    let reach_of_field = range.y - range.x;
+    let places = max(PLACE_ROUNDING, 2.4e-7 * largest(frame.cells));
+    let digits = 1.2e-7 * max(abs(range.x), abs(range.y));
+    let rounding = select(0.0, reach_of_field * places + digits, reach_of_field > 0.0);
     let steepest = abs(whole.y) + 2.0 * abs(whole.z) + 3.0 * abs(whole.w);
     let turns = turns_of(whole);
     var index = find_band(whole.x);
@@ -236,6 +267,9 @@ fn add_exactly(light: ptr<function, Light>, field: vec4f, ends: vec2f, range: ve
         let crosses = is_beyond && !is_cut && !is_deep;
         is_cut = is_cut || is_deep;
 
+        if !crosses && !is_cut && rounding > 0.0 {
+            touch(light, index, cubic, width, goal, rounding, length);
+        }
         add_interval(light, band, cubic, width, length);
         if (*light).depth >= OPAQUE_DEPTH {
             break;

@@ -8,7 +8,7 @@ use volery_reference::Image;
 use volery_scene::VoxelGrid;
 use volery_tests::{Drawer, Shared, at_most, backend, distance, draw, exact, matter_view};
 
-use super::{BACKGROUND, aslant, filled, noise, shell, transfer, wave};
+use super::{BACKGROUND, aslant, fill, noise, shell, transfer, wave};
 
 by_both_backends! {
     the_unit_of_length_does_not_matter
@@ -51,9 +51,9 @@ fn matters() -> Vec<Matter> {
     let steps = transfer(&[(0.0, 0.0), (0.25, 0.0), (0.25, 0.5), (0.625, 0.25), (0.625, 0.0)], 1.0);
     let spike = transfer(&[(0.5, 0.0), (0.5 + 2_f64.powi(-9), 0.75), (0.5 + 2_f64.powi(-8), 0.0)], 0.25);
     let opaque = || shell(0.687_5, 0.687_5 + 2_f64.powi(-10), 1.0, 1.0);
-    let smooth = || filled(dims, |p| dyadic(wave(p)));
-    let rough = || filled(dims, |p| dyadic(noise(p)));
-    let mask = filled(dims, |p| f64::from(u8::from(wave(p) > 0.5)));
+    let smooth = || fill(dims, |p| dyadic(wave(p)));
+    let rough = || fill(dims, |p| dyadic(noise(p)));
+    let mask = fill(dims, |p| f64::from(u8::from(wave(p) > 0.5)));
     let outside = aslant(extent);
     let matter = |name, values, transfer, camera| Matter { name, dims, spacing, values, transfer, camera };
     vec![
@@ -111,7 +111,7 @@ impl Matter {
             (0..8).map(corner).sum::<f64>() / 8.0
         };
         let dims = self.dims.map(|n| 2 * n - 1);
-        let values = filled(dims, value);
+        let values = fill(dims, value);
         Self { dims, values, spacing: self.spacing / 2.0, ..self }
     }
 
@@ -129,7 +129,7 @@ impl Matter {
             (0..3).for_each(|axis| old[from[axis]] = new[axis]);
             self.values[(old[2] * self.dims[1] + old[1]) * self.dims[0] + old[0]]
         };
-        let values = filled(dims, value);
+        let values = fill(dims, value);
         let Camera { eye, target, up, projection } = self.camera;
         let camera = Camera { eye: vector(eye), target: vector(target), up: vector(up), projection };
         Self { dims, spacing: vector(self.spacing), values, camera, ..self }

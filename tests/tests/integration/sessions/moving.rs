@@ -37,8 +37,13 @@ fn turn<D: Data>(session: &mut Session<D>, how: How, dial: Dial, choice: Backend
     let view = |session: &Session<D>, number: u32| {
         let azimuth_deg = 360.0 * f64::from(number) / f64::from(NUM_CAMERAS);
         let direction = Some(Direction { azimuth_deg, elevation_deg: 15.0, zoom: 1.0 });
-        let options =
-            ViewOptions { width: 64, height: 48, direction, how: Some(how.clone()), ..ViewOptions::default() };
+        let options = ViewOptions {
+            width: 64,
+            height: 48,
+            direction,
+            how: Some(how.clone()),
+            ..ViewOptions::default()
+        };
         View { dial, ..session.view(&options) }
     };
     let mut after = [UploadedBytes::default(); 2];
