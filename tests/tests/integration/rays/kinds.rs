@@ -20,6 +20,7 @@ by_both_backends! {
     two_neighbouring_values_of_sixteen_bits
     rays_in_the_faces_of_the_domain
     values_far_from_zero
+    blanks_in_a_bent_field
 }
 
 const SIZE: [u32; 2] = [48, 48];
@@ -67,6 +68,20 @@ impl Judge {
         let found = distance(&what, &drawn, &truth);
         at_most("largest difference", found.max, MAX);
         at_most("rmse", found.rmse, RMSE);
+    }
+}
+
+/// Cells beside blank ones, so bent that they are read in more pieces than two, and cells without any bend.
+fn blanks_in_a_bent_field(choice: BackendChoice, test: &str) {
+    let Some(judge) = Judge::new(choice, test) else { return };
+    let dims = [23, 25, 21];
+    let colors = transfer(&[(0.0, 0.0), (0.3, 0.2), (0.6, 0.05), (1.0, 0.5)], 1.0);
+    for (what, bend) in [("smooth", 0.0), ("rough", 0.5)] {
+        let mut samples = fill(dims, |p| ((1.0 - bend) * wave(p) + bend * noise(p)) as f32);
+        for place in (0..samples.len()).filter(|place| volery_data::hash(*place as u64).is_multiple_of(29)) {
+            samples[place] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY][place % 3];
+        }
+        judge.judge(what, dims, samples, colors.clone());
     }
 }
 
