@@ -13,7 +13,8 @@ use volery::{
     open_backend, read_input,
 };
 use volery_frame::{
-    Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, PictureView, Planes, UploadError, UploadedBytes, VolumeLayout,
+    Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, PictureView, Planes, UploadError,
+    UploadedBytes, VolumeLayout,
 };
 use volery_io::SceneFile;
 use volery_io::scene_file::SceneTransfer;
