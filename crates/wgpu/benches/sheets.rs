@@ -108,7 +108,7 @@ fn draw(criterion: &mut Criterion) {
     group.sample_size(10).throughput(Throughput::Elements(stack.triangles.len() as u64));
     for (name, revision, vertices, transfer, light, size) in [
         ("exact", once, exact, &values, None, 262),
-        ("exact, uploaded", 0, exact, &values, None, 262),
+        ("exact, uploaded", None, exact, &values, None, 262),
         ("quantized, rows, lit", twice, quantized, &magnitudes, light, 262),
         ("exact, hardly a fragment", once, exact, &values, None, 16),
     ] {

@@ -306,7 +306,7 @@ pub fn evicted_bricks_leave_room_for_others(backend: &mut dyn Backend) {
         let found = backend.draw(&Frame { view, content });
         assert_eq!(found.err(), Some(DrawError::NotResident { id: ids[0] }), "a frame with evicted bricks");
         // Others in their place, and then those that were there, in another order.
-        let blank = vec![0_u8; 125];
+        let blank = [0_u8; 125];
         let other = |(number, [x, y, z]): (u64, [u32; 3])| {
             let texels = Texels::U8(&blank[..(x * y * z) as usize]);
             Brick { id: BrickId(1 << 40 | number), samples: [x, y, z], texels }

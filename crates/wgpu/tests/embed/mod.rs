@@ -7,7 +7,7 @@ use volery_wgpu::{OpenError, USEFUL_FEATURES, WgpuBackend, needed_limits};
 
 #[path = "../../examples/embed.rs"]
 #[expect(dead_code, reason = "the example's own main")]
-mod embed;
+mod example;
 
 /// What this file checks.
 pub(crate) const ALL: &[Property] = &[
@@ -20,7 +20,7 @@ pub(crate) const ALL: &[Property] = &[
 const MAX: f32 = 1e-6;
 
 fn a_texture_shows_what_is_read_back(_: &mut dyn Backend) {
-    let max = embed::largest_difference().expect("the device draws");
+    let max = example::largest_difference().expect("the device draws");
     println!("largest difference {max:e} (threshold {MAX:e})");
     assert!(max <= MAX, "{max:e}, expected at most {MAX:e}");
 }
