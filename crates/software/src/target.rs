@@ -164,19 +164,26 @@ impl Target {
     /// Fills a band of rows from its tiles.
     #[inline(always)]
     fn fill(&self, band: &mut [[f32; 3]], tiles: &[Tile], first_row: u32) {
-        let width = self.view.width;
-        for (row, pixels) in (first_row..).zip(band.chunks_exact_mut(width as usize)) {
-            for (column, pixel) in (0..width).zip(pixels) {
-                let behind = self.surfaces.color(column, row);
-                *pixel = match &tiles[(column / TILE) as usize].light {
-                    None => behind,
-                    Some(light) => {
-                        let [x, y] = [column % TILE, row % TILE];
-                        let packet = &light[(y / PACKET * TILE_PACKETS + x / PACKET) as usize];
-                        let lane = (y % PACKET * PACKET + x % PACKET) as usize;
-                        self.shown.over([0, 1, 2, 3].map(|i| packet[i][lane]), behind)
-                    }
+        for (row, pixels) in (first_row..).zip(band.chunks_exact_mut(self.view.width as usize)) {
+            let (packet_row, lane_row) =
+                (row % TILE / PACKET * TILE_PACKETS, (row % PACKET * PACKET) as usize);
+            let columns = (0..self.view.width).step_by(TILE as usize);
+            for ((tile, first_column), pixels) in
+                tiles.iter().zip(columns).zip(pixels.chunks_mut(TILE as usize))
+            {
+                let behind = (first_column..).map(|column| self.surfaces.color(column, row));
+                let Some(light) = &tile.light else {
+                    pixels.iter_mut().zip(behind).for_each(|(pixel, behind)| *pixel = behind);
+                    continue;
                 };
+                let packets = &light[packet_row as usize..(packet_row + TILE_PACKETS) as usize];
+                let lanes = packets.iter().flat_map(|packet| {
+                    (lane_row..lane_row + PACKET as usize)
+                        .map(move |lane| [0, 1, 2, 3].map(|i| packet[i][lane]))
+                });
+                for ((pixel, light), behind) in pixels.iter_mut().zip(lanes).zip(behind) {
+                    *pixel = self.shown.over(light, behind);
+                }
             }
         }
     }

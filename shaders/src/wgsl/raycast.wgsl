@@ -347,6 +347,20 @@ fn doubt_of_color(a: Piece, b: Piece) -> f32 {
     return depth * depth * largest(abs(b.color - a.color)) * (1.0 / 32.0);
 }
 
+// A stretch of a cell: the texels in its middle and at its end, and the balanced middle.
+struct Stretch {
+    middle: f32,
+    last: f32,
+    over: f32,
+}
+
+// The stretch between two places of a ray that starts at `origin` and goes by `step`, whose first texel is known.
+fn stretch_of(corners: Corners, first: f32, origin: vec3f, places: vec2f, step: vec3f) -> Stretch {
+    let middle = texel_at(corners, origin + 0.5 * (places.x + places.y) * step);
+    let last = texel_at(corners, origin + places.y * step);
+    return Stretch(middle, last, balanced(first, middle, last));
+}
+
 // The light of the matter along a ray, behind what it has gathered.
 //
 // One loop, each round of which leaves one box: a cell of a brick, or a cube of empty units. Nested loops would
@@ -373,10 +387,7 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let inverse_scale = power_of_2(127u - level);
         let brick_low = floor((place + 0.5) * (frame.bricks_per_cell * inverse_scale)) * (scale * frame.brick_cells);
         let cell = floor((place + 0.5 - brick_low) * inverse_scale);
-        var is_passed = false;
-        if HAS_OTHERS && is_occupied {
-            is_passed = is_other(words.x);
-        }
+        let is_passed = HAS_OTHERS && is_occupied && is_other(words.x);
         let is_visible = is_occupied && !is_passed && all(cell < cells_of(words.y));
         let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
         let stored = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
@@ -384,11 +395,11 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let corners = texels_of(stored, is_matter);
 
         // The box that this round leaves.
-        let radius = f32(words.x) - 1.0;
         let cells = select(1.0, frame.brick_cells, is_passed);
         let low_cell = select(cell, vec3f(0.0), is_passed);
-        let low = select((unit - radius) * frame.unit_cells, brick_low + low_cell * scale, is_occupied);
-        let high = low + select((2.0 * radius + 1.0) * frame.unit_cells, cells * scale, is_occupied);
+        let around = f32(words.x);
+        let low = select((unit + 1.0 - around) * frame.unit_cells, brick_low + low_cell * scale, is_occupied);
+        let high = low + select((2.0 * around - 1.0) * frame.unit_cells, cells * scale, is_occupied);
         let faces = (mix(low, high, ray.rising) - ray.start) * ray.inverse;
         let exit = max(min(smallest(faces), t_end), t);
         // A round without length finds the value where a run of cells begins.
@@ -397,23 +408,20 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let origin = ray.start - low;
         let light_behind = select(0.0, light.transmittance, is_matter && !is_start);
         let is_exact = HAS_EXACT && light_behind > 0.0 && (words.y & EXACT) != 0u;
-        var middle = texel_at(corners, (origin + 0.5 * (t + t_far) * ray.direction) * inverse_scale);
-        var last = texel_at(corners, (origin + t_far * ray.direction) * inverse_scale);
-        var over = balanced(end.texel, middle, last);
-        let distance = mean_distance(end.texel, middle, last, over);
+        let step = ray.direction * inverse_scale;
+        var stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_far), step);
+        let distance = mean_distance(end.texel, stretch.middle, stretch.last, stretch.over);
         let way = (t_far - t) * inverse_scale * ray.motion;
         var doubt = doubt_of_field(corners, distance, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
         var t_next = t_far;
         if doubt > MAX_DOUBT && !is_exact {
             t_next = min(t + max(good_share(doubt) * (t_far - t), MIN_STRETCH * scale), t_far);
-            middle = texel_at(corners, (origin + 0.5 * (t + t_next) * ray.direction) * inverse_scale);
-            last = texel_at(corners, (origin + t_next * ray.direction) * inverse_scale);
-            over = balanced(end.texel, middle, last);
+            stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_next), step);
             doubt = min(doubt, MAX_DOUBT);
         }
         let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);
-        let a = piece_to(end, over, depth);
-        let b = piece_to(a.end, last, depth);
+        let a = piece_to(end, stretch.over, depth);
+        let b = piece_to(a.end, stretch.last, depth);
         let color_doubt = doubt_of_color(a, b) * light_behind;
         if color_doubt > MAX_DOUBT && !is_exact && t_next - t > MIN_STRETCH * scale {
             reach = 0.5 * (t_next - t);
@@ -422,7 +430,7 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         reach = min(2.0 * reach, FAR);
         if is_exact {
             let cubic = cubic_along(corners, (origin + t * ray.direction) * inverse_scale, way);
-            add_exactly(&light, cubic, vec2f(end.texel, last), range_of(corners), 2.0 * depth * frame.depth_scale);
+            add_exactly(&light, cubic, vec2f(end.texel, stretch.last), range_of(corners), 2.0 * depth * frame.depth_scale);
             light.doubt += EXACT_DOUBT * (light_behind - light.transmittance);
         } else {
             light.doubt += color_doubt + doubt;

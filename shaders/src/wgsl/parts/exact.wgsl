@@ -204,6 +204,14 @@ fn shallow_width(band: Band, cubic: vec4f, width: f32, goal: f32, length: f32) -
     return min(part, 1.5 * MAX_INTERVAL_DEPTH * 1.442695 / steepest);
 }
 
+// How far rounding may take a texel of a cell with texels in this range.
+fn rounding_of(range: vec2f) -> f32 {
+    let width = range.y - range.x;
+    let places = max(PLACE_ROUNDING, 2.4e-7 * largest(frame.cells));
+    let digits = 1.2e-7 * max(abs(range.x), abs(range.y));
+    return select(0.0, width * places + digits, width > 0.0);
+}
+
 // Adds the light of one cell, along whose way the texel is this cubic; `length` is the way's optical depth to the base
 // 2 per -ln(1 - opacity).
 fn add_exactly(light: ptr<function, Light>, field: vec4f, ends: vec2f, range: vec2f, length: f32) {
@@ -213,10 +221,7 @@ fn add_exactly(light: ptr<function, Light>, field: vec4f, ends: vec2f, range: ve
     let first = clamp(select(field.x, ends.x, is_huge), range.x, range.y);
     let last = clamp(ends.y, range.x, range.y);
     let whole = vec4f(first, field.yzw);
-    let reach_of_field = range.y - range.x;
-    let places = max(PLACE_ROUNDING, 2.4e-7 * largest(frame.cells));
-    let digits = 1.2e-7 * max(abs(range.x), abs(range.y));
-    let rounding = select(0.0, reach_of_field * places + digits, reach_of_field > 0.0);
+    let rounding = rounding_of(range);
     let steepest = abs(whole.y) + 2.0 * abs(whole.z) + 3.0 * abs(whole.w);
     let turns = turns_of(whole);
     var index = find_band(whole.x);
