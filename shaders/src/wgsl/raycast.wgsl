@@ -361,6 +361,12 @@ fn stretch_of(corners: Corners, first: f32, origin: vec3f, places: vec2f, step: 
     return Stretch(middle, last, balanced(first, middle, last));
 }
 
+// The finest cell that a ray is in from `t` on, in a box that it leaves at `faces` or beside it.
+fn place_behind(ray: Ray, t: f32, low: vec3f, high: vec3f, faces: vec3f) -> vec3f {
+    let inside = clamp(floor(ray.start + t * ray.direction), low, min(high, frame.cells) - 1.0);
+    return select(inside, mix(low - 1.0, high, ray.rising), faces <= vec3f(t));
+}
+
 // The light of the matter along a ray, behind what it has gathered.
 //
 // One loop, each round of which leaves one box: a cell of a brick, or a cube of empty units. Nested loops would
@@ -440,9 +446,7 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         end = b.end;
         end_level = select(NO_LEVEL, level, is_matter);
 
-        let inside = clamp(floor(ray.start + t_next * ray.direction), low, min(high, frame.cells) - 1.0);
-        let beyond = mix(low - 1.0, high, ray.rising);
-        place = select(select(inside, beyond, faces <= vec3f(t_next)), place, vec3<bool>(is_start));
+        place = select(place_behind(ray, t_next, low, high, faces), place, vec3<bool>(is_start));
         t = t_next;
     }
     return light;
