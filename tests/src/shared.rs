@@ -3,7 +3,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use volery::Backend;
-use volery_frame::{Brick, BrickId, Device, DrawError, Drawn, Frame, UploadError, VolumeLayout};
+use volery_frame::{
+    Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, Frame, PictureView, UploadError,
+    UploadedBytes, VolumeLayout,
+};
 
 /// A backend of which more than one has hold. It holds the bricks of the session that was opened last.
 #[derive(Clone)]
@@ -54,8 +57,32 @@ impl Backend for Shared {
         self.lock().backend.upload(bricks)
     }
 
+    fn evict(&mut self, bricks: &[BrickId]) {
+        self.lock().backend.evict(bricks);
+    }
+
     fn resident_bytes(&self) -> u64 {
         self.lock().backend.resident_bytes()
+    }
+
+    fn uploaded_bytes(&self) -> UploadedBytes {
+        self.lock().backend.uploaded_bytes()
+    }
+
+    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
+        self.lock().backend.begin(view)
+    }
+
+    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
+        self.lock().backend.draw_part(content)
+    }
+
+    fn finished(&mut self) -> Vec<FinishedPart> {
+        self.lock().backend.finished()
+    }
+
+    fn finish(&mut self) -> Result<Drawn, DrawError> {
+        self.lock().backend.finish()
     }
 
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {

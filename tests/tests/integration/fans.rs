@@ -9,7 +9,8 @@ use volery::{
     ViewOptions,
 };
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Cube, Device, DrawError, Drawn, Frame, UploadError, VolumeLayout,
+    Backend, Brick, BrickId, Content, Cube, Device, DrawError, Drawn, FinishedPart, PictureView, UploadError,
+    UploadedBytes, VolumeLayout,
 };
 use volery_reference::Image;
 use volery_scene::{Ray, VoxelGrid};
@@ -39,14 +40,34 @@ impl Backend for Keeping {
         self.backend.upload(bricks)
     }
 
+    fn evict(&mut self, bricks: &[BrickId]) {
+        self.backend.evict(bricks);
+    }
+
     fn resident_bytes(&self) -> u64 {
         self.backend.resident_bytes()
     }
 
-    fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {
-        let Content::Cubes(content) = frame.content else { panic!("fans draw cubes") };
-        *self.kept.lock().unwrap() = content.cubes.to_vec();
-        self.backend.draw(frame)
+    fn uploaded_bytes(&self) -> UploadedBytes {
+        self.backend.uploaded_bytes()
+    }
+
+    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
+        self.backend.begin(view)
+    }
+
+    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
+        let Content::Cubes(cubes) = content else { panic!("fans draw cubes") };
+        *self.kept.lock().unwrap() = cubes.cubes.to_vec();
+        self.backend.draw_part(content)
+    }
+
+    fn finished(&mut self) -> Vec<FinishedPart> {
+        self.backend.finished()
+    }
+
+    fn finish(&mut self) -> Result<Drawn, DrawError> {
+        self.backend.finish()
     }
 }
 
