@@ -336,7 +336,14 @@ pub fn nothing_that_was_kept_is_stale(backend: &mut dyn Backend) {
         let mut show = |world: &World| world.draw(backend, &world.meshes, world.whole(kind)).image;
         // Made only for this, so that nobody has seen them.
         let expected = others.each_ref().map(&mut show);
-        assert!(expected[0] != expected[1], "{kind:?}: two worlds look alike");
+        // Contents and surfaces each make a difference, which what is stale would not.
+        let [first, second] =
+            others.each_ref().map(|world| world.draw(backend, &[], world.whole(kind)).image);
+        assert!(first != second, "{kind:?}: two contents look alike");
+        let of_first = |world: &World| others[0].draw(backend, &world.meshes, others[0].whole(kind)).image;
+        let [first, second] = others.each_ref().map(of_first);
+        assert!(first != second, "{kind:?}: two surfaces look alike");
+        let mut show = |world: &World| world.draw(backend, &world.meshes, world.whole(kind)).image;
         for (round, number) in [0, 0, 1, 1, 0, 1].into_iter().enumerate() {
             let image = show(&worlds[number]);
             assert_same_bits(&format!("{kind:?} of world {number}, {round}"), &image, &expected[number]);

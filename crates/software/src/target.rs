@@ -9,6 +9,7 @@ use fearless_simd::{Level, dispatch, prelude::*};
 use rayon::prelude::*;
 use volery_frame::{Image, PictureView, RayDoubt};
 
+use crate::math::axes;
 use crate::surfaces::Surfaces;
 
 /// Pixels of a tile per axis.
@@ -171,18 +172,16 @@ impl Target {
             for ((tile, first_column), pixels) in
                 tiles.iter().zip(columns).zip(pixels.chunks_mut(TILE as usize))
             {
-                let behind = (first_column..).map(|column| self.surfaces.color(column, row));
-                let Some(light) = &tile.light else {
-                    pixels.iter_mut().zip(behind).for_each(|(pixel, behind)| *pixel = behind);
-                    continue;
-                };
+                for (column, pixel) in (first_column..).zip(&mut *pixels) {
+                    *pixel = self.surfaces.color(column, row);
+                }
+                let Some(light) = &tile.light else { continue };
                 let packets = &light[packet_row as usize..(packet_row + TILE_PACKETS) as usize];
-                let lanes = packets.iter().flat_map(|packet| {
-                    (lane_row..lane_row + PACKET as usize)
-                        .map(move |lane| [0, 1, 2, 3].map(|i| packet[i][lane]))
-                });
-                for ((pixel, light), behind) in pixels.iter_mut().zip(lanes).zip(behind) {
-                    *pixel = self.shown.over(light, behind);
+                for (packet, pixels) in packets.iter().zip(pixels.chunks_mut(PACKET as usize)) {
+                    for (lane, pixel) in (lane_row..).zip(pixels) {
+                        let light = [packet[0][lane], packet[1][lane], packet[2][lane], packet[3][lane]];
+                        *pixel = self.shown.over(light, *pixel);
+                    }
                 }
             }
         }
@@ -193,13 +192,29 @@ impl Shown {
     /// Light before what is behind it.
     #[inline(always)]
     fn over(&self, light: [f32; 4], behind: [f32; 3]) -> [f32; 3] {
-        if self.is_planes {
-            return [0, 1, 2].map(|i| light[3].mul_add(behind[i], light[i]));
-        }
-        let sum = [0, 1, 2].map(|i| light[i] + light[3] * behind[i]);
-        let Some([low, high]) = self.emitted else { return sum };
+        let [low, high] = match (self.is_planes, self.emitted) {
+            (true, _) => {
+                return axes(
+                    #[inline(always)]
+                    |i| light[3].mul_add(behind[i], light[i]),
+                );
+            }
+            (false, None) => {
+                return axes(
+                    #[inline(always)]
+                    |i| light[i] + light[3] * behind[i],
+                );
+            }
+            (false, Some(emitted)) => emitted,
+        };
         // `max` takes the other where the sum is NaN.
-        [0, 1, 2].map(|i| sum[i].max(low[i].min(behind[i])).min(high[i].max(behind[i])))
+        axes(
+            #[inline(always)]
+            |i| {
+                let sum = light[i] + light[3] * behind[i];
+                sum.max(low[i].min(behind[i])).min(high[i].max(behind[i]))
+            },
+        )
     }
 
     /// Counts a part of sheets, which can emit colours between these.
