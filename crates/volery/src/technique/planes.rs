@@ -10,9 +10,9 @@
 //! # The paper's future work: its error
 //! A node of the cut shows a field that is off by at most its data error `e`, known exactly from the pyramid; where
 //! it blends into a coarser neighbour, by a mix of its own and its parent's. What that does to a colour is bounded by
-//! [`ColorChange`]; the largest bound of the nodes drawn is the bound of the picture, and [`certified`] refines until
+//! [`ColorChange`](crate::color_change::ColorChange); the largest bound of the nodes drawn is the bound of the picture, and [`certified`] refines until
 //! it is at most what was asked for. It is there for every picture, whichever dial chose its nodes. Where an error was
-//! asked for, it is that of the [`parts`] of nodes that planes meet, each with its own share of the parent's samples;
+//! asked for, it is that of the parts of nodes that planes meet, each with its own share of the parent's samples;
 //! else of whole nodes. The nearest samples of two levels may be anywhere in the range of a node's values, whatever
 //! its field: where they are shown, the width of that range takes the place of the data error.
 //!
