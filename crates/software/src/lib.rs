@@ -35,7 +35,7 @@
 //! control point (`exact`). So hard cells cost three to five times as much as others, and easy ones nothing. Values are
 //! rounded to the table's bins (1/8192 of what can be seen). A ray ends when less than [`MIN_TRANSMITTANCE`] of what
 //! lies behind can come through, and that rest is dropped. Sums are in f32. Each picture says what all that may come to:
-//! [`RayDoubt`].
+//! [`RayDoubt`](volery_frame::RayDoubt).
 //!
 //! # Guarantees
 //! The same bits for any number of threads, and for any parts of a picture but those of sheets where a tile ends early
