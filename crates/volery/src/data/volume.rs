@@ -108,8 +108,8 @@ impl VolumeData {
         self.store
     }
 
-    /// How bricks are stored from now on: as a transfer function asks. Where that changes, it is another volume to a
-    /// backend.
+    /// How bricks are stored from now on: as a transfer function asks, where texels are neither whole numbers nor colours.
+    /// Where that changes, it is another volume to a backend.
     pub(crate) fn store_for(&mut self, transfer: &TransferFunction) -> Store {
         let range = self.store.layout.value_range;
         // Of the transfer function alone: pictures do not depend on those before.

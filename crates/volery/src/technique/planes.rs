@@ -100,7 +100,7 @@ impl Planes {
         chosen: Chosen,
     ) -> Result<super::Plan, RenderError> {
         let transfer = view.of_values()?;
-        let store = if volume.has_colors() { volume.store() } else { volume.store_for(transfer) };
+        let store = volume.store_for(transfer);
         let layout = &store.layout;
         let points =
             self.points.get(&(transfer.clone(), layout.revision), || PointTransfer::new(transfer, layout));

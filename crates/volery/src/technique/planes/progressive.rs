@@ -21,7 +21,7 @@ use volery_octree::{Answer, select};
 use volery_pyramid::{Node, NodeSource};
 
 use super::{Chosen, Planes, choose};
-use crate::data::{Data, VolumeData};
+use crate::data::VolumeData;
 use crate::residency::{self, Uploaded};
 use crate::session::{Picture, RenderError, Session, Times};
 use crate::view::{How, PlaneView, View};
@@ -131,12 +131,7 @@ impl Progressive<'_> {
 
     /// Makes bricks resident that are at hand, or waits for the most wanted one.
     fn receive(&mut self) -> Result<Uploaded, RenderError> {
-        let store = match &self.view.transfer {
-            crate::Transfer::Values(transfer) if !self.session.data().has_colors() => {
-                self.session.data_mut().store_for(transfer)
-            }
-            _ => self.session.data().store(),
-        };
+        let store = self.session.data_mut().store_for(self.view.of_values()?);
         let own = self.session.data().source();
         let source: &dyn NodeSource = self.arrivals.unwrap_or(own);
         let mut arrived: Vec<Node> = Vec::new();
