@@ -34,6 +34,7 @@ mod plane_oracle;
 mod planes;
 mod requests;
 mod sampling;
+mod seams;
 mod sheet_oracle;
 mod sheets;
 mod surfaces;
@@ -113,6 +114,9 @@ properties! { $
         volume_of_blanks_shows_the_background
         small_bricks_and_large_ones_agree
         bricks_of_many_cells;
+    seams:
+        levels_join_without_seams
+        levels_do_not_jump;
     levels:
         ramp_is_the_same_in_mixed_levels
         coarse_bricks_end_with_the_domain

@@ -5,14 +5,14 @@ use volery_scene::{Camera, Plane, TriangleMesh};
 
 use volery_frame::{
     Backend, BlendedBrick, Brick, BrickId, Content, Counted, Cube, Cubes, DrawError, Drawn, Frame, Image,
-    PictureView, PlacedBrick, Planes, PointTransfer, RayTransfer, Rays, Revision, Sampling, Sheet,
-    SheetTransfer, SheetVertices, Sheets, TexelType, Texels, Thickness, UploadedBytes,
+    JoinedBrick, PictureView, PlacedBrick, Planes, PointTransfer, RayTransfer, Rays, Revision, Sampling,
+    Sheet, SheetTransfer, SheetVertices, Sheets, TexelType, Texels, Thickness, UploadedBytes,
 };
 
 use super::oracle::{assert_same_bits, assert_shows_something, difference};
 use super::world::{
-    BACKGROUND, BACKGROUND_F64, Storage, Volume, draw_bricks, draw_resident, hold, marschner_lobb,
-    smooth_transfer, transfer,
+    BACKGROUND, BACKGROUND_F64, OwnedBrick, Storage, Volume, draw_bricks, draw_resident, hold,
+    marschner_lobb, smooth_transfer, transfer,
 };
 
 const SIZE: [u32; 2] = [97, 61];
@@ -24,7 +24,7 @@ const MAX_RMSE: f64 = 1e-6;
 struct World {
     camera: Camera,
     volume: Volume,
-    bricks: Vec<PlacedBrick>,
+    bricks: Vec<JoinedBrick>,
     blended: Vec<BlendedBrick>,
     ray_transfer: RayTransfer,
     point_transfer: PointTransfer,
@@ -62,8 +62,9 @@ impl World {
         let camera = Camera::fitted(volume.extent(), 35.0, 25.0, 1.2, is_orthographic);
         let owned = volume.bricks(&camera);
         hold(backend, &volume, &owned);
-        let bricks: Vec<_> = owned.iter().map(|brick| brick.placed).collect();
-        let blended = bricks.iter().map(|&placed| BlendedBrick { placed, low_corners: 0 }).collect();
+        let bricks = owned.iter().map(|brick| brick.placed.into()).collect();
+        let blended = |brick: &OwnedBrick| BlendedBrick { placed: brick.placed, low_corners: 0 };
+        let blended = owned.iter().map(blended).collect();
         let function = smooth_transfer(4.0);
         let middle = volume.extent() * 0.5;
         let normals = [DVec3::new(1.0, 0.3, 0.2), DVec3::new(-0.2, 1.0, 0.1), DVec3::new(0.1, 0.4, -1.0)];
@@ -300,7 +301,7 @@ pub fn evicted_bricks_leave_room_for_others(backend: &mut dyn Backend) {
         assert!(stay.iter().all(|brick| backend.is_resident(brick.placed.id)), "others are not");
         assert!(backend.resident_bytes() <= bytes, "resident bytes after an eviction");
         let ray_transfer = volume.integrated(&function);
-        let placed: Vec<_> = bricks.iter().map(|brick| brick.placed).collect();
+        let placed: Vec<_> = bricks.iter().map(|brick| brick.placed.into()).collect();
         let [width, height] = SIZE;
         let view = PictureView { width, height, camera, background: BACKGROUND, meshes: &[] };
         let content = Content::Rays(Rays { transfer: &ray_transfer, bricks: &placed });
@@ -364,8 +365,8 @@ pub fn cameras_that_move_upload_nothing(backend: &mut dyn Backend) {
             // In another order, and now and then without those that might be out of sight.
             let place = |brick: &PlacedBrick| brick.id.0.rotate_left(step) & 0xffff_ffff;
             let is_seen = |brick: &PlacedBrick| step == 0 || step % 3 > 0 || brick.first_cell[0] < 12;
-            world.bricks = bricks.iter().copied().filter(is_seen).collect();
-            world.bricks.sort_by_key(place);
+            world.bricks = bricks.iter().copied().filter(|brick| is_seen(&brick.placed)).collect();
+            world.bricks.sort_by_key(|brick| place(&brick.placed));
             world.blended = blended.iter().copied().filter(|brick| is_seen(&brick.placed)).collect();
             world.blended.sort_by_key(|brick| place(&brick.placed));
             world.sheets.reverse();
@@ -422,7 +423,7 @@ pub fn pictures_are_begun_and_ended(backend: &mut dyn Backend) {
     backend.begin(&world.view(&[])).expect("the suite's pictures are small");
     backend.draw_part(&world.whole(Kind::Cubes)).expect("the suite's parts are right");
     backend.begin(&view).expect("the suite's pictures are small");
-    let missing = [PlacedBrick { id: BrickId(1 << 50), first_cell: [0; 3], level: 0 }];
+    let missing = [PlacedBrick { id: BrickId(1 << 50), first_cell: [0; 3], level: 0 }.into()];
     let missing = Content::Rays(Rays { transfer: &world.ray_transfer, bricks: &missing });
     let not_resident = Err(DrawError::NotResident { id: BrickId(1 << 50) });
     assert_eq!(backend.draw_part(&missing), not_resident, "a part with a missing brick");

@@ -4,8 +4,8 @@ use glam::DVec3;
 use volery_scene::Camera;
 
 use volery_frame::{
-    Backend, Brick, BrickId, Content, DrawError, Frame, Image, PictureView, PlacedBrick, Rays, TexelType,
-    Texels, UploadError,
+    Backend, Brick, BrickId, Content, DrawError, Frame, Image, JoinedBrick, PictureView, PlacedBrick, Rays,
+    TexelType, Texels, UploadError,
 };
 
 use super::oracle::{assert_background, assert_close, assert_same_bits, march_volume};
@@ -30,7 +30,8 @@ fn draw_placed(
     bricks: &[PlacedBrick],
 ) -> Result<Image, DrawError> {
     let transfer = &volume.integrated(&smooth_transfer(1.0));
-    let content = Content::Rays(Rays { transfer, bricks });
+    let bricks: Vec<_> = bricks.iter().copied().map(JoinedBrick::from).collect();
+    let content = Content::Rays(Rays { transfer, bricks: &bricks });
     let frame = Frame {
         view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
         content,

@@ -8,7 +8,7 @@ use volery_scene::mesh::shade;
 use volery_scene::{Camera, Plane, Projection, Ray, TransferFunction, TriangleMesh};
 
 use volery_frame::{
-    Backend, BlendedBrick, Content, Counted, Cube, Cubes, Frame, Image, PictureView, PlacedBrick, Planes,
+    Backend, BlendedBrick, Content, Counted, Cube, Cubes, Frame, Image, JoinedBrick, PictureView, Planes,
     PointTransfer, Rays, Sampling, Sheet, SheetTransfer, SheetVertices, Sheets, TexelType, Thickness,
 };
 
@@ -95,7 +95,7 @@ impl World {
         meshes: &[TriangleMesh],
         size: [u32; 2],
     ) -> Image {
-        let bricks: Vec<PlacedBrick> = self.bricks.iter().map(|brick| brick.placed).collect();
+        let bricks: Vec<JoinedBrick> = self.bricks.iter().map(|brick| brick.placed.into()).collect();
         let transfer = &self.volume.integrated(&self.transfer);
         draw(backend, camera, meshes, size, Content::Rays(Rays { transfer, bricks: &bricks }))
     }

@@ -4,8 +4,8 @@ use glam::{DVec3, UVec3};
 use volery_scene::{Camera, ControlPoint, Projection, TransferFunction};
 
 use volery_frame::{
-    Backend, Brick, BrickId, Content, Frame, Image, PictureView, PlacedBrick, RayTransfer, Rays, Revision,
-    TexelType, Texels, VolumeLayout,
+    Backend, Brick, BrickId, Content, Frame, Image, JoinedBrick, PictureView, PlacedBrick, RayTransfer, Rays,
+    Revision, TexelType, Texels, VolumeLayout,
 };
 
 pub(super) const BACKGROUND: [f32; 3] = [0.125, 0.25, 0.5];
@@ -132,6 +132,11 @@ impl Volume {
         sum
     }
 
+    /// The value of a sample; beyond the domain, what coarse bricks have there.
+    pub(super) fn sample(&self, cell: [u32; 3]) -> f64 {
+        stored(&self.layout, (self.value_at)(UVec3::from_array(cell).as_dvec3()))
+    }
+
     /// The brick of a level that begins at this finest cell.
     pub(super) fn brick(&self, level: u32, first_cell: [u32; 3]) -> OwnedBrick {
         let layout = &self.layout;
@@ -249,9 +254,21 @@ pub(super) fn draw_resident(
     bricks: &[OwnedBrick],
 ) -> Image {
     assert!(camera.defects().is_empty(), "the suite's camera: {:?}", camera.defects());
-    let placed: Vec<_> = bricks.iter().map(|brick| brick.placed).collect();
+    let placed: Vec<_> = bricks.iter().map(|brick| brick.placed.into()).collect();
+    draw_joined(backend, volume, transfer, camera, [width, height], &placed)
+}
+
+/// Draws resident bricks that join others.
+pub(super) fn draw_joined(
+    backend: &mut dyn Backend,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    camera: &Camera,
+    [width, height]: [u32; 2],
+    bricks: &[JoinedBrick],
+) -> Image {
     let transfer = &volume.integrated(transfer);
-    let content = Content::Rays(Rays { transfer, bricks: &placed });
+    let content = Content::Rays(Rays { transfer, bricks });
     let frame = Frame {
         view: PictureView { width, height, camera: *camera, background: BACKGROUND, meshes: &[] },
         content,

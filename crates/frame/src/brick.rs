@@ -118,6 +118,26 @@ pub struct PlacedBrick {
     pub level: u32,
 }
 
+/// A brick and how it joins coarser neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct JoinedBrick {
+    /// Which brick, and where.
+    pub placed: PlacedBrick,
+    /// Its seams: the faces and edges whose samples take the values that the next coarser level has there, each by the
+    /// direction `s` in which it lies, of -1, 0 and 1 along x, y, z: bit `(s.x + 1) + 3 (s.y + 1) + 9 (s.z + 1)`. An edge
+    /// of a seam's face is one as well. What they change are samples at odd places: each becomes the mean of its
+    /// neighbours at even ones, two along an edge, four across a face, where beyond the brick's last sample that one
+    /// counts. 0 where there is none.
+    pub seams: u32,
+}
+
+impl From<PlacedBrick> for JoinedBrick {
+    /// Without seams.
+    fn from(placed: PlacedBrick) -> Self {
+        Self { placed, seams: 0 }
+    }
+}
+
 impl PlacedBrick {
     /// Lower and upper corner in finest cells, clipped to the volume: the part of space that it draws.
     pub fn bounds(&self, layout: &VolumeLayout) -> [[u32; 3]; 2] {

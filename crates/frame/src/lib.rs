@@ -40,7 +40,7 @@ pub mod sheets;
 pub use backend::{
     Backend, Device, DeviceKind, DrawError, Drawn, FinishedPart, Image, RayDoubt, UploadError, UploadedBytes,
 };
-pub use brick::{Brick, BrickId, PlacedBrick, TexelType, Texels, VolumeLayout};
+pub use brick::{Brick, BrickId, JoinedBrick, PlacedBrick, TexelType, Texels, VolumeLayout};
 pub use brick_grid::BrickGrid;
 pub use cubes::{Cube, Cubes, Thickness};
 pub use plane_tiles::{PlaneTile, PlaneTiles};
@@ -94,12 +94,12 @@ pub enum Content<'a> {
 impl Content<'_> {
     /// The bricks that must be resident.
     pub fn bricks(&self) -> impl Iterator<Item = &PlacedBrick> {
-        let (rays, planes): (&[PlacedBrick], &[BlendedBrick]) = match self {
+        let (rays, planes): (&[JoinedBrick], &[BlendedBrick]) = match self {
             Self::Rays(rays) => (rays.bricks, &[]),
             Self::Planes(planes) => (&[], planes.bricks),
             Self::Cubes(_) | Self::Sheets(_) => (&[], &[]),
         };
-        rays.iter().chain(planes.iter().map(|brick| &brick.placed))
+        rays.iter().map(|brick| &brick.placed).chain(planes.iter().map(|brick| &brick.placed))
     }
 }
 
@@ -110,7 +110,7 @@ pub struct Rays<'a> {
     pub transfer: &'a RayTransfer,
     /// What to draw, front to back: no brick hides one that comes before it. Bricks do not overlap; what
     /// no brick covers is empty.
-    pub bricks: &'a [PlacedBrick],
+    pub bricks: &'a [JoinedBrick],
 }
 
 #[cfg(doctest)]

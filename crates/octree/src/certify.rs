@@ -133,7 +133,7 @@ fn too_coarse<F: FnMut(Node, u8) -> f64>(
 }
 
 /// Replaces nodes by their children, as a walk that comes by them would.
-fn split(layout: &Layout, cut: &Cut, too_coarse: &[bool], filter: &mut impl Filter) -> Cut {
+pub(crate) fn split(layout: &Layout, cut: &Cut, too_coarse: &[bool], filter: &mut impl Filter) -> Cut {
     let mut result = Cut { nodes: Vec::with_capacity(cut.nodes.len()), skipped: cut.skipped.clone() };
     for (&node, &splits) in cut.nodes.iter().zip(too_coarse) {
         if splits {

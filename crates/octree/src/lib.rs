@@ -26,6 +26,7 @@ pub mod certify;
 pub mod cut;
 pub mod filters;
 pub mod order;
+pub mod seams;
 pub mod section;
 pub mod select;
 pub mod validate;
@@ -36,6 +37,7 @@ pub use certify::{Certified, certified, without_unseen};
 pub use cut::Cut;
 pub use filters::{CuttingPlanes, DataTolerance, Focus, Frustum, Transparency};
 pub use order::{Viewpoint, front_to_back};
+pub use seams::{Joined, joined, seams};
 pub use section::{IndexPlane, Section, section};
 pub use select::{Answer, Filter, select};
 

@@ -13,9 +13,10 @@ const BLOCKS: u32 = 8;
 /// Some blocks of a brick: bit `x` of byte `y + 8 z`.
 pub(crate) type Occupancy = [u8; 64];
 
-/// Cells of a block per axis, for bricks of `brick_cells`: a power of two.
-pub(crate) const fn block_cells(brick_cells: u32) -> u32 {
-    brick_cells.div_ceil(BLOCKS).next_power_of_two()
+/// Cells of a block per axis, for bricks of `brick_cells`: a power of two, so that what a seam makes of a sample stays
+/// within the range of its block, above 1.
+pub(crate) fn block_cells(brick_cells: u32) -> u32 {
+    brick_cells.div_ceil(BLOCKS).next_power_of_two().max(2)
 }
 
 /// The samples of one octree node.

@@ -50,6 +50,7 @@ mod packet;
 mod plane;
 mod plane_field;
 mod pool;
+mod seams;
 mod sheets;
 mod surfaces;
 mod target;

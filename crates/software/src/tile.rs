@@ -4,7 +4,7 @@ use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use glam::DVec3;
 use rayon::prelude::*;
 use volery_frame::ray_transfer::BinSet;
-use volery_frame::{DrawError, PictureView, PlacedBrick, RayTransfer, Rays, VolumeLayout};
+use volery_frame::{DrawError, JoinedBrick, PictureView, RayTransfer, Rays, VolumeLayout};
 use volery_scene::{Projection, RayGrid};
 
 use crate::MIN_TRANSMITTANCE;
@@ -13,6 +13,7 @@ use crate::exact::Bands;
 use crate::math::axes;
 use crate::packet::Packet;
 use crate::pool::Bricks;
+use crate::seams::Seams;
 use crate::surfaces::Surfaces;
 use crate::target::{self, PACKET, TILE, TILE_PACKETS, Target, Tile};
 use crate::texel::Texel;
@@ -23,6 +24,7 @@ struct Drawable<'a, T> {
     brick: &'a StoredBrick<T>,
     marks: Marks,
     level: u32,
+    seams: Seams,
     /// Lower and upper corner in finest cells.
     bounds: [[f64; 3]; 2],
     /// First and last tile along x and y that its picture touches.
@@ -53,16 +55,17 @@ pub(crate) fn draw<T: Texel>(
     let projector = Projector::new(&target.view, layout);
     let stored: Vec<_> = placed_bricks
         .iter()
-        .map(|placed| {
-            bricks.get(&placed.id).ok_or(DrawError::NotResident { id: placed.id }).map(|b| (placed, b))
+        .map(|brick| {
+            let id = brick.placed.id;
+            bricks.get(&id).ok_or(DrawError::NotResident { id }).map(|stored| (brick, stored))
         })
         .collect::<Result<_, _>>()?;
-    let exact: Vec<_> = (0..=placed_bricks.iter().map(|placed| placed.level).max().unwrap_or(0))
+    let exact: Vec<_> = (0..=placed_bricks.iter().map(|brick| brick.placed.level).max().unwrap_or(0))
         .map(|level| transfer.exact_bins(layout, level))
         .collect();
     let drawables: Vec<_> = stored
         .into_par_iter()
-        .filter_map(|(placed, brick)| drawable(transfer, &exact, layout, &projector, placed, brick))
+        .filter_map(|(joined, brick)| drawable(transfer, &exact, layout, &projector, joined, brick))
         .collect();
     let table = Table {
         entries: transfer.entries(),
@@ -89,7 +92,7 @@ fn drawable<'a, T: Texel>(
     exact: &[BinSet],
     layout: &VolumeLayout,
     projector: &Projector,
-    placed: &PlacedBrick,
+    &JoinedBrick { placed, seams }: &JoinedBrick,
     brick: &'a StoredBrick<T>,
 ) -> Option<Drawable<'a, T>> {
     let [low, high] = placed.bounds(layout);
@@ -99,7 +102,7 @@ fn drawable<'a, T: Texel>(
     let bounds = [low.map(f64::from), high];
     let tiles = projector.tiles(bounds)?;
     let marks = brick.marks(transfer, &exact[placed.level as usize], placed.level)?;
-    Some(Drawable { brick, marks, level: placed.level, bounds, tiles })
+    Some(Drawable { brick, marks, level: placed.level, seams: Seams::new(seams), bounds, tiles })
 }
 
 /// Finds the tiles that a box can touch.
@@ -215,6 +218,8 @@ fn draw_packet<S: Simd, T: Texel>(
         let matter = Matter {
             samples: drawable.brick.samples,
             texels: &drawable.brick.texels,
+            seams: drawable.seams,
+            brick_cells: shared.layout.brick_cells,
             occupancy: &drawable.marks.occupancy,
             exact: drawable.marks.exact.as_ref(),
             block: block_cells(shared.layout.brick_cells),

@@ -17,6 +17,7 @@ use crate::cell::{Cell, balanced, mean_distance};
 use crate::exact::{Bands, EXACT_DOUBT, Field, add_cells};
 use crate::math::{axes, four, front_weight, opacity_of_depth, transpose};
 use crate::packet::Span;
+use crate::seams::{Seams, join};
 use crate::texel::Texel;
 
 /// The largest doubt of a cell, as a difference of a colour channel. Four pieces have a quarter of that of two.
@@ -43,6 +44,10 @@ pub(crate) struct Matter<'a, T> {
     /// Samples along x, y, z, each at least 2.
     pub(crate) samples: [u32; 3],
     pub(crate) texels: &'a [T],
+    /// Faces and edges that join coarser bricks.
+    pub(crate) seams: Seams,
+    /// Cells per axis of a brick that the volume's end does not cut short.
+    pub(crate) brick_cells: u32,
     /// Blocks that may hold matter.
     pub(crate) occupancy: &'a Occupancy,
     /// Blocks for which the table is too coarse, if there are any.
@@ -476,7 +481,11 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         }
         let [x, y, z] = walker.cell;
         let address: i32x16<S> = z.mul_add(slice, y.mul_add(row, x)).to_int();
-        let cell = Cell::new(T::corners(simd, rows, address), table.texel_origin);
+        let mut corners = T::corners(simd, rows, address);
+        if !matter.seams.are_none() {
+            join(simd, matter, (&walker.cell, walker.active), &mut corners);
+        }
+        let cell = Cell::new(corners, table.texel_origin);
 
         let exit = walker.exits();
         let end = exit[0].min(exit[1]).min(exit[2]).min(span.length).max(walker.depth);

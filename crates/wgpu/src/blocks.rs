@@ -7,9 +7,12 @@ use volery_frame::{Brick, Texels};
 /// longer on llvmpipe; at 2 the ranges would take as much memory as 8-bit texels.
 const GOOD_BLOCK: f64 = 4.0;
 
-/// Cells per edge of a block: the divisor of a brick's that is nearest to the good size, above 1 where it can be.
+/// Cells per edge of a block: the divisor of a brick's that is nearest to the good size, above 1 where it can be. It is even
+/// where the brick's is: what a seam makes of a sample stays within the range of its block.
 pub(crate) fn block_cells(brick_cells: u32) -> u32 {
-    let divisors = (brick_cells.min(2)..=brick_cells).filter(|d| brick_cells.is_multiple_of(*d));
+    let fits =
+        |d: &u32| brick_cells.is_multiple_of(*d) && (d.is_multiple_of(2) || !brick_cells.is_multiple_of(2));
+    let divisors = (brick_cells.min(2)..=brick_cells).filter(fits);
     let misfit = |divisor: &u32| (f64::from(*divisor) / GOOD_BLOCK).ln().abs();
     divisors.min_by(|a, b| misfit(a).total_cmp(&misfit(b))).unwrap_or(1)
 }

@@ -44,6 +44,8 @@ pub(crate) struct Form {
     pub(crate) has_exact: bool,
     /// Units hold bricks that are not of this part.
     pub(crate) has_others: bool,
+    /// Bricks join coarser ones.
+    pub(crate) has_seams: bool,
     /// Rays end at surfaces.
     pub(crate) has_surfaces: bool,
 }
@@ -52,7 +54,14 @@ impl Form {
     /// Of texels that may be blank or not, in bricks of a layout; without the rest.
     pub(crate) fn new(layout: &VolumeLayout, has_blanks: bool) -> Self {
         let is_whole = matches!(layout.texel, TexelType::U8 | TexelType::U16);
-        Self { has_blanks, is_whole, has_exact: false, has_others: false, has_surfaces: false }
+        Self {
+            has_blanks,
+            is_whole,
+            has_exact: false,
+            has_others: false,
+            has_seams: false,
+            has_surfaces: false,
+        }
     }
 }
 
@@ -149,6 +158,7 @@ impl Raycast {
             "frame" => self.frame.as_entire_binding(),
             "units" => wgpu::BindingResource::TextureView(&units),
             "chosen" => placed.choice.buffer.as_entire_binding(),
+            "seams" => placed.seams.as_entire_binding(),
             "atlas" => wgpu::BindingResource::TextureView(&atlas),
             "atlas_sampler" => wgpu::BindingResource::Sampler(&self.sampler),
             "transfer" => wgpu::BindingResource::TextureView(&transfer),
@@ -201,6 +211,7 @@ fn pipeline(
                 (raycast::IS_WHOLE, f64::from(form.is_whole)),
                 (raycast::HAS_EXACT, f64::from(form.has_exact)),
                 (raycast::HAS_OTHERS, f64::from(form.has_others)),
+                (raycast::HAS_SEAMS, f64::from(form.has_seams)),
                 (raycast::HAS_SURFACES, f64::from(form.has_surfaces)),
             ],
             ..Default::default()

@@ -73,6 +73,8 @@ override IS_WHOLE: bool = false;
 override HAS_EXACT: bool = true;
 // Whether units hold bricks that are not of this part.
 override HAS_OTHERS: bool = false;
+// Whether bricks join coarser ones.
+override HAS_SEAMS: bool = false;
 // Whether rays end at surfaces.
 override HAS_SURFACES: bool = false;
 
@@ -127,6 +129,9 @@ const CELLS_MASK: u32 = 1023;
 @group(0) @binding(8) var<storage, read_write> worst: array<atomic<u32>>;
 // A bit per slot, set where its brick is of this part.
 @group(0) @binding(9) var<storage, read> chosen: array<u32>;
+// Per slot, the seams of its brick: the faces and edges that join a coarser brick, each by the direction s in which it
+// lies, of -1, 0 and 1: bit (s.x + 1) + 3 (s.y + 1) + 9 (s.z + 1).
+@group(0) @binding(10) var<storage, read> seams: array<u32>;
 
 struct Ray {
     start: vec3f,
@@ -224,9 +229,14 @@ fn cells_of(word: u32) -> vec3f {
     return vec3f((vec3u(word) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));
 }
 
+// The number of a brick's slot, from a unit's first word.
+fn slot_number(word: u32) -> u32 {
+    return ((word >> LAYER_SHIFT) & SLOT_MASK) * frame.slots_per_layer + (word & SLOT_MASK);
+}
+
 // Whether a brick is no part of what is drawn, from a unit's first word.
 fn is_other(word: u32) -> bool {
-    let slot = ((word >> LAYER_SHIFT) & SLOT_MASK) * frame.slots_per_layer + (word & SLOT_MASK);
+    let slot = slot_number(word);
     return ((chosen[slot / 32u] >> (slot % 32u)) & 1u) == 0u;
 }
 
@@ -251,6 +261,44 @@ fn texels_of(stored: Corners, is_matter: bool) -> Corners {
         texels = Corners(low - frame.texel_origin, high - low);
     }
     return Corners(select(vec4f(0.0), texels.low, is_matter), select(vec4f(0.0), texels.rise, is_matter));
+}
+
+// A sample of a brick, as a texel from the origin.
+fn sample_at(slot: vec2u, place: vec3f) -> f32 {
+    let row = floor((place.z + 0.5) * frame.rows_per_slice);
+    let slice = (frame.brick_cells + 1.0) * vec2f(place.z - row * frame.slices_per_row, row);
+    let at = vec2f(0.0, f32(slot.y) * frame.slot_height) + place.xy + slice;
+    let stored = textureLoad(atlas, vec2i(at), slot.x, 0).x;
+    return select(stored, round(stored * frame.texels_per_step), IS_WHOLE) - frame.texel_origin;
+}
+
+// A sample of a brick of `cells` cells, or what a seam makes of it: at an odd place the mean of its neighbours at even ones.
+fn joined_sample(seam: u32, slot: vec2u, place: vec3f, cells: vec3f, own: f32) -> f32 {
+    let side = select(vec3f(1.0), vec3f(0.0), place == vec3f(0.0)) + select(vec3f(0.0), vec3f(1.0), place == vec3f(frame.brick_cells));
+    let is_odd = (side == vec3f(1.0)) & (floor(place * 0.5) * 2.0 != place);
+    if ((seam >> u32(dot(side, vec3f(1.0, 3.0, 9.0)))) & 1u) == 0u || !any(is_odd) {
+        return own;
+    }
+    // One step along the first axis of odd place, one along the others: of those there is one at most.
+    let first = vec3<bool>(is_odd.x, is_odd.y && !is_odd.x, is_odd.z && !is_odd.x && !is_odd.y);
+    let a = select(vec3f(0.0), vec3f(1.0), first);
+    let b = select(vec3f(0.0), vec3f(1.0), is_odd) - a;
+    var sum = sample_at(slot, place - a - b) + sample_at(slot, min(place + a - b, cells));
+    sum += sample_at(slot, min(place - a + b, cells)) + sample_at(slot, min(place + a + b, cells));
+    return 0.25 * sum;
+}
+
+// The corners of a cell along a seam.
+fn joined_corners(corners: Corners, seam: u32, slot: vec2u, cell: vec3f, cells: vec3f) -> Corners {
+    var low = corners.low;
+    var high = corners.low + corners.rise;
+    for (var i = 0u; i < 4u; i++) {
+        // Gathered in the order (0, 1), (1, 1), (1, 0), (0, 0) of (x, y).
+        let place = cell + vec3f(f32(((i + 1u) >> 1u) & 1u), f32(1u - (i >> 1u)), 0.0);
+        low[i] = joined_sample(seam, slot, place, cells, low[i]);
+        high[i] = joined_sample(seam, slot, place + vec3f(0.0, 0.0, 1.0), cells, high[i]);
+    }
+    return Corners(low, high - low);
 }
 
 fn texel_at(corners: Corners, w: vec3f) -> f32 {
@@ -398,7 +446,13 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
         let stored = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
         let is_matter = is_visible && !is_blank(stored);
-        let corners = texels_of(stored, is_matter);
+        var corners = texels_of(stored, is_matter);
+        if HAS_SEAMS && is_matter && any((cell == vec3f(0.0)) | (cell == vec3f(frame.brick_cells - 1.0))) {
+            let seam = seams[slot_number(words.x)];
+            if seam != 0u {
+                corners = joined_corners(corners, seam, slot, cell, cells_of(words.y));
+            }
+        }
 
         // The box that this round leaves.
         let cells = select(1.0, frame.brick_cells, is_passed);

@@ -11,7 +11,7 @@ pub mod stack;
 use std::sync::Arc;
 
 use volery_frame::{
-    BlendedBrick, Content, Cube, Cubes, Light, PlacedBrick, Planes, PointTransfer, RayTransfer, Rays,
+    BlendedBrick, Content, Cube, Cubes, JoinedBrick, Light, Planes, PointTransfer, RayTransfer, Rays,
     Sampling, Sheet, SheetTransfer, Thickness,
 };
 use volery_pyramid::Node;
@@ -99,7 +99,7 @@ pub enum Drawing {
         /// Colour and extinction.
         transfer: Arc<RayTransfer>,
         /// Front to back.
-        bricks: Vec<PlacedBrick>,
+        bricks: Vec<JoinedBrick>,
     },
     /// Cutting planes.
     Planes {

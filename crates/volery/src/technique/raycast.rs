@@ -4,18 +4,18 @@
 //! One walk over the tree asks three filters: outside the view or perfectly transparent under the transfer
 //! function, a node is skipped; within the data tolerance it is drawn at its level; else its children are
 //! asked. The nodes left are put in exact visibility order and become the bricks of a frame. Skipped nodes
-//! cost nothing: they are neither read nor resident nor drawn.
+//! cost nothing: they are neither read nor resident nor drawn. With a tolerance the cut is balanced and joined
+//! ([`volery_octree::seams`]): rays meet one continuous field.
 //!
 //! # Guarantees
 //! - Without a tolerance, and with a tolerance of 0, every node drawn is of the finest level.
 //! - With a tolerance `T` the field drawn is nowhere farther than `T` from the full resolution (in data
 //!   units; but for rounding of texels), and blank matter is where it was.
 //!
-//! # Non-goals
-//! No blending between levels: at the boundary of two levels the field may jump by at most `2 T`.
+//! - Where levels meet, the field is continuous.
 
-use volery_frame::{RayTransfer, Revision};
-use volery_octree::{DataTolerance, Frustum, Transparency, Viewpoint, front_to_back, select};
+use volery_frame::{JoinedBrick, RayTransfer, Revision};
+use volery_octree::{DataTolerance, Frustum, Joined, Transparency, Viewpoint, front_to_back, joined, select};
 use volery_pyramid::Node;
 use volery_reference::Tracer;
 use volery_scene::TransferFunction;
@@ -57,16 +57,29 @@ impl Technique<VolumeData> for Raycast {
             self.table.get(&(transfer.clone(), layout.revision), || RayTransfer::new(transfer, layout));
         let source = volume.source();
         let nodes = source.layout();
-        let filters = (
-            Transparency { source, transfer },
-            Frustum::new(nodes, &view.camera, view.width, view.height),
-            DataTolerance { source, tolerance: volume.tolerance(view.dial).unwrap_or(0.0) },
-        );
-        let cut = select(nodes, filters);
+        let seen =
+            (Transparency { source, transfer }, Frustum::new(nodes, &view.camera, view.width, view.height));
+        let Joined { cut, seams } = match volume.tolerance(view.dial) {
+            Some(tolerance) if tolerance > 0.0 => {
+                let error =
+                    |node: Node| source.stats(node).iter().map(|stats| stats.error).fold(0.0, f64::max);
+                joined(nodes, seen, error, tolerance)
+            }
+            // Coarse nodes, if there are any, show the finest field: nothing jumps.
+            _ => {
+                let (seen, tolerance) = (seen, 0.0);
+                let cut = select(nodes, (seen, DataTolerance { source, tolerance }));
+                Joined { seams: vec![0; cut.nodes.len()], cut }
+            }
+        };
         let order = front_to_back(nodes, &cut.nodes, Viewpoint::of(&view.camera, nodes));
-        let ordered: Vec<Node> = order.into_iter().map(|place| cut.nodes[place]).collect();
+        let ordered: Vec<Node> = order.iter().map(|&place| cut.nodes[place]).collect();
         let numbers = Numbers::of(nodes);
-        let bricks = ordered.iter().map(|&node| numbers.place(nodes, node)).collect();
+        let brick = |&place: &usize| JoinedBrick {
+            placed: numbers.place(nodes, cut.nodes[place]),
+            seams: seams[place],
+        };
+        let bricks = order.iter().map(brick).collect();
         Ok(Plan {
             drawing: Drawing::Rays { transfer: table, bricks },
             work: Work { nodes_by_level: Some(cut.nodes_by_level()), ..Work::default() },
