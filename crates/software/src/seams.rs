@@ -65,9 +65,24 @@ struct Place<'a, 'b, S: Simd, T> {
     cell: &'a [f32x16<S>; 3],
 }
 
-/// Gives the corners of cells at seams the values that they have there.
-#[inline(always)]
+/// The corners of cells, which at seams have other values than the brick's samples.
+#[inline(never)]
 pub(crate) fn join<S: Simd, T: Texel>(
+    simd: S,
+    matter: &Matter<'_, T>,
+    at: (&[f32x16<S>; 3], mask32x16<S>),
+    corners: &[f32x16<S>; 8],
+) -> [f32x16<S>; 8] {
+    let mut joined = *corners;
+    simd.vectorize(
+        #[inline(always)]
+        || join_all(simd, matter, at, &mut joined),
+    );
+    joined
+}
+
+#[inline(always)]
+fn join_all<S: Simd, T: Texel>(
     simd: S,
     matter: &Matter<'_, T>,
     (cell, active): (&[f32x16<S>; 3], mask32x16<S>),
@@ -76,15 +91,12 @@ pub(crate) fn join<S: Simd, T: Texel>(
     let last = f32x16::splat(simd, (matter.brick_cells - 1) as f32);
     let zero = f32x16::splat(simd, 0.0);
     let place = Place { simd, matter, cell };
-    for axis in 0..3 {
+    for (axis, cell) in cell.iter().enumerate() {
         for side in 0..2 {
             if matter.seams.faces >> (2 * axis + side) & 1 == 1 {
-                let lanes = active & cell[axis].simd_eq(if side == 0 { zero } else { last });
+                let lanes = active & cell.simd_eq(if side == 0 { zero } else { last });
                 if lanes.any_true() {
-                    simd.vectorize(
-                        #[inline(always)]
-                        || place.join_face((axis, side), lanes, corners),
-                    );
+                    place.join_face((axis, side), lanes, corners);
                 }
             }
         }

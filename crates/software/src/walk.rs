@@ -56,6 +56,18 @@ pub(crate) struct Matter<'a, T> {
     pub(crate) block: u32,
 }
 
+impl<T: Texel> Matter<'_, T> {
+    /// The corners of cells, which at seams have other values than the samples there.
+    #[inline(always)]
+    fn joined<S: Simd>(&self, simd: S, walker: &Walker<'_, S>, corners: [f32x16<S>; 8]) -> [f32x16<S>; 8] {
+        if self.seams.are_none() {
+            return corners;
+        }
+        // Called, and by copies: what is rare takes no registers from the rest.
+        join(simd, self, (&walker.cell, walker.active), &corners)
+    }
+}
+
 /// Classification: texel to bin to integrals.
 #[derive(Clone, Copy)]
 pub(crate) struct Table<'a> {
@@ -481,10 +493,7 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         }
         let [x, y, z] = walker.cell;
         let address: i32x16<S> = z.mul_add(slice, y.mul_add(row, x)).to_int();
-        let mut corners = T::corners(simd, rows, address);
-        if !matter.seams.are_none() {
-            join(simd, matter, (&walker.cell, walker.active), &mut corners);
-        }
+        let corners = matter.joined(simd, &walker, T::corners(simd, rows, address));
         let cell = Cell::new(corners, table.texel_origin);
 
         let exit = walker.exits();

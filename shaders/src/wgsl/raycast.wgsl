@@ -229,9 +229,15 @@ fn cells_of(word: u32) -> vec3f {
     return vec3f((vec3u(word) >> vec3u(0u, CELLS_SHIFT, 2u * CELLS_SHIFT)) & vec3u(CELLS_MASK));
 }
 
+// Layer and row of a brick's slot, from a unit's first word.
+fn slot_of(word: u32) -> vec2u {
+    return vec2u(word >> LAYER_SHIFT, word) & vec2u(SLOT_MASK);
+}
+
 // The number of a brick's slot, from a unit's first word.
 fn slot_number(word: u32) -> u32 {
-    return ((word >> LAYER_SHIFT) & SLOT_MASK) * frame.slots_per_layer + (word & SLOT_MASK);
+    let slot = slot_of(word);
+    return slot.x * frame.slots_per_layer + slot.y;
 }
 
 // Whether a brick is no part of what is drawn, from a unit's first word.
@@ -288,8 +294,17 @@ fn joined_sample(seam: u32, slot: vec2u, place: vec3f, cells: vec3f, own: f32) -
     return 0.25 * sum;
 }
 
-// The corners of a cell along a seam.
-fn joined_corners(corners: Corners, seam: u32, slot: vec2u, cell: vec3f, cells: vec3f) -> Corners {
+// The corners of a cell of the brick that a unit's words name, along a seam or not; without a brick as they are.
+fn joined_corners(corners: Corners, words: vec2u, cell: vec3f) -> Corners {
+    if !HAS_SEAMS || words.x == 0u || !any((cell == vec3f(0.0)) | (cell == vec3f(frame.brick_cells - 1.0))) {
+        return corners;
+    }
+    let seam = seams[slot_number(words.x)];
+    if seam == 0u {
+        return corners;
+    }
+    let slot = slot_of(words.x);
+    let cells = cells_of(words.y);
     var low = corners.low;
     var high = corners.low + corners.rise;
     for (var i = 0u; i < 4u; i++) {
@@ -443,16 +458,9 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let cell = floor((place + 0.5 - brick_low) * inverse_scale);
         let is_passed = HAS_OTHERS && is_occupied && is_other(words.x);
         let is_visible = is_occupied && !is_passed && all(cell < cells_of(words.y));
-        let slot = vec2u(words.x >> LAYER_SHIFT, words.x) & vec2u(SLOT_MASK);
-        let stored = corners_of_cell(slot, select(vec3f(0.0), cell, is_visible));
+        let stored = corners_of_cell(slot_of(words.x), select(vec3f(0.0), cell, is_visible));
         let is_matter = is_visible && !is_blank(stored);
-        var corners = texels_of(stored, is_matter);
-        if HAS_SEAMS && is_matter && any((cell == vec3f(0.0)) | (cell == vec3f(frame.brick_cells - 1.0))) {
-            let seam = seams[slot_number(words.x)];
-            if seam != 0u {
-                corners = joined_corners(corners, seam, slot, cell, cells_of(words.y));
-            }
-        }
+        let corners = joined_corners(texels_of(stored, is_matter), select(vec2u(0u), words, is_matter), cell);
 
         // The box that this round leaves.
         let cells = select(1.0, frame.brick_cells, is_passed);
