@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use volery::glam::{DQuat, DVec3};
 use volery::{
-    Backend, BackendChoice, Camera, Data, GridData, How, InputData, Plane, PlaneView, Session, StackView,
-    Thickness, View, VolumeData, open_backend,
+    Backend, BackendChoice, Camera, Data, GridData, How, InputData, Plane, PlaneView, Session, Slicing,
+    StackView, Thickness, View, VolumeData, open_backend,
 };
 use volery_frame::UploadedBytes;
 use volery_tests::{read_scene, view_of};

@@ -8,7 +8,7 @@ use volery::{
     BackendChoice, Camera, ControlPoint, Dial, How, Projection, Thickness, TransferFunction, View,
     ViewOptions, VolumeData,
 };
-use volery_frame::{Backend, Content, Cube, DrawError};
+use volery_frame::{Backend, Content, Cube, DrawError, Revision, VolumeLayout};
 use volery_reference::Image;
 use volery_scene::{Ray, VoxelGrid};
 use volery_software::SoftwareBackend;

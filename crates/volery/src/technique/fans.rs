@@ -10,7 +10,7 @@
 //!
 //! # Cameras that move
 //! The order depends on the eye by how many planes between voxels lie below it along each axis, and on the way of
-//! parallel rays by signs: so it is the same from everywhere outside the volume's slabs in one octant. The cubes depend on
+//! parallel rays by signs: so it is the same from everywhere in one octant outside the slabs of the cubes' box. The cubes depend on
 //! the eye only where some are outside the view. So the last list serves again, under its revision, where that order is
 //! the same and all of it is inside the view, and is sent to no device again: it is the one that a walk would make.
 //!
@@ -32,7 +32,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 use volery_frame::{Cube, Revision, Thickness, VolumeLayout};
 use volery_octree::{Frustum, Viewpoint};
@@ -70,8 +70,24 @@ struct List {
     order: [usize; 3],
     revision: Revision,
     cubes: Arc<Vec<Cube>>,
-    /// Of all of them, in world space.
-    bounds: [DVec3; 2],
+    /// Of all of them, on the lattice.
+    lattice_bounds: [IVec3; 2],
+    spacing: DVec3,
+}
+
+impl List {
+    fn bounds(&self) -> [DVec3; 2] {
+        self.lattice_bounds.map(|corner| corner.as_dvec3() * self.spacing / 2.0)
+    }
+
+    /// Whether a walk from there goes the same way: planes that no cubes lie on both sides of do not matter.
+    fn is_ordered_for(&self, order: [usize; 3]) -> bool {
+        let [low, high] = self.lattice_bounds.map(|corner| corner.to_array().map(|plane| plane as usize));
+        (0..3).all(|axis| {
+            let inner = |number: usize| number.clamp(low[axis].div_ceil(2), high[axis] / 2);
+            inner(order[axis]) == inner(self.order[axis])
+        })
+    }
 }
 
 impl Technique<VolumeData> for Fans {
@@ -111,17 +127,19 @@ impl Technique<VolumeData> for Fans {
         let order = order(Viewpoint::of(&view.camera, layout), volume.grid().dims());
         let made_of = (store.encoding, transfer.clone(), tolerance);
         let frustum = Frustum::new(layout, &view.camera, view.width, view.height);
-        let serves =
-            |list: &&List| list.order == order && list.made_of == made_of && frustum.holds(list.bounds);
+        let serves = |list: &&List| {
+            list.made_of == made_of && list.is_ordered_for(order) && frustum.holds(list.bounds())
+        };
         let (revision, cubes) = match self.list.as_ref().filter(serves) {
             Some(list) => (Some(list.revision), list.cubes.clone()),
             None => {
                 let of_volume = (volume.grid(), &*tree, layout);
                 let (cubes, is_whole) = cubes(of_volume, store.encoding, (view, transfer), tolerance);
                 let cubes = Arc::new(cubes);
-                self.list = is_whole.then(|| {
-                    let (cubes, bounds) = (cubes.clone(), bounds(&cubes, &store.layout));
-                    List { made_of, order, revision: Revision::new(), cubes, bounds }
+                self.list = (is_whole && !cubes.is_empty()).then(|| {
+                    let (cubes, lattice_bounds) = (cubes.clone(), lattice_bounds(&cubes, &store.layout));
+                    let spacing = store.layout.spacing;
+                    List { made_of, order, revision: Revision::new(), cubes, lattice_bounds, spacing }
                 });
                 (self.list.as_ref().map(|list| list.revision), cubes)
             }
@@ -178,13 +196,11 @@ fn order(viewpoint: Viewpoint, dims: [usize; 3]) -> [usize; 3] {
     })
 }
 
-/// The box around cubes, in world space.
-fn bounds(cubes: &[Cube], layout: &VolumeLayout) -> [DVec3; 2] {
-    let whole = |cube: &Cube| cube.lattice_bounds(layout).map(glam::IVec3::from_array);
-    let join = |a: [glam::IVec3; 2], b: [glam::IVec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-    let none = || [glam::IVec3::MAX, glam::IVec3::MIN];
-    let bounds = cubes.par_iter().map(whole).reduce(none, join);
-    bounds.map(|corner| corner.as_dvec3() * layout.spacing / 2.0)
+/// The box around cubes.
+fn lattice_bounds(cubes: &[Cube], layout: &VolumeLayout) -> [IVec3; 2] {
+    let bounds = |cube: &Cube| cube.lattice_bounds(layout).map(IVec3::from_array);
+    let join = |a: [IVec3; 2], b: [IVec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+    cubes.par_iter().map(bounds).reduce(|| [IVec3::MAX, IVec3::MIN], join)
 }
 
 /// How many triangles the fans of cubes have: ten for a cube of which one face is toward the eye, else twelve
