@@ -17,7 +17,7 @@ use crate::sheet::{Tile, contact_sheet};
 use crate::{Failure, open, say};
 
 /// Width and height of a picture.
-const SIDE: u32 = 232;
+const SIDE: u32 = 228;
 
 /// Pictures in a row of the contact sheet: those of one scene.
 const COLUMNS: u32 = 7;
