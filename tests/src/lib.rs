@@ -12,10 +12,7 @@ use volery::{
     Backend, BackendChoice, Data, Dial, How, Image, Input, InputData, Picture, StackView, View, open_backend,
     read_input,
 };
-use volery_frame::{
-    Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, PictureView, Planes, Revision,
-    UploadError, UploadedBytes, VolumeLayout,
-};
+use volery_frame::{Content, DrawError, Planes};
 use volery_io::SceneFile;
 use volery_io::scene_file::SceneTransfer;
 use volery_reference::metrics::{Comparison, compare};
@@ -175,54 +172,13 @@ pub fn at_most(what: &str, measured: f64, threshold: f64) {
 pub struct Unblended<B>(pub B);
 
 impl<B: Backend> Backend for Unblended<B> {
-    fn device(&self) -> Device {
-        self.0.device()
-    }
-
-    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
-        self.0.set_volume(layout)
-    }
-
-    fn volume(&self) -> Option<Revision> {
-        self.0.volume()
-    }
-
-    fn is_resident(&self, id: BrickId) -> bool {
-        self.0.is_resident(id)
-    }
-
-    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
-        self.0.upload(bricks)
-    }
-
-    fn evict(&mut self, bricks: &[BrickId]) {
-        self.0.evict(bricks);
-    }
-
-    fn resident_bytes(&self) -> u64 {
-        self.0.resident_bytes()
-    }
-
-    fn uploaded_bytes(&self) -> UploadedBytes {
-        self.0.uploaded_bytes()
-    }
-
-    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
-        self.0.begin(view)
-    }
+    volery_conformance::hand_on!(self, self.0 => device set_volume volume is_resident upload evict resident_bytes
+        uploaded_bytes begin finished finish);
 
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
         let Content::Planes(planes) = *content else { return self.0.draw_part(content) };
         let mut bricks = planes.bricks.to_vec();
         bricks.iter_mut().for_each(|brick| brick.low_corners = 0);
         self.0.draw_part(&Content::Planes(Planes { bricks: &bricks, ..planes }))
-    }
-
-    fn finished(&mut self) -> Vec<FinishedPart> {
-        self.0.finished()
-    }
-
-    fn finish(&mut self) -> Result<Drawn, DrawError> {
-        self.0.finish()
     }
 }

@@ -3,10 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use volery::Backend;
-use volery_frame::{
-    Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, PictureView, Revision, UploadError,
-    UploadedBytes, VolumeLayout,
-};
+use volery_frame::{UploadError, VolumeLayout};
 
 /// A backend of which more than one has hold. It holds the bricks of the session that was opened last.
 #[derive(Clone)]
@@ -39,53 +36,12 @@ impl Shared {
 }
 
 impl Backend for Shared {
-    fn device(&self) -> Device {
-        self.lock().backend.device()
-    }
+    volery_conformance::hand_on!(self, self.lock().backend => device volume is_resident upload evict resident_bytes
+        uploaded_bytes begin draw_part finished finish);
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
         let mut state = self.lock();
         state.layout = Some(*layout);
         state.backend.set_volume(layout)
-    }
-
-    fn volume(&self) -> Option<Revision> {
-        self.lock().backend.volume()
-    }
-
-    fn is_resident(&self, id: BrickId) -> bool {
-        self.lock().backend.is_resident(id)
-    }
-
-    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
-        self.lock().backend.upload(bricks)
-    }
-
-    fn evict(&mut self, bricks: &[BrickId]) {
-        self.lock().backend.evict(bricks);
-    }
-
-    fn resident_bytes(&self) -> u64 {
-        self.lock().backend.resident_bytes()
-    }
-
-    fn uploaded_bytes(&self) -> UploadedBytes {
-        self.lock().backend.uploaded_bytes()
-    }
-
-    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
-        self.lock().backend.begin(view)
-    }
-
-    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
-        self.lock().backend.draw_part(content)
-    }
-
-    fn finished(&mut self) -> Vec<FinishedPart> {
-        self.lock().backend.finished()
-    }
-
-    fn finish(&mut self) -> Result<Drawn, DrawError> {
-        self.lock().backend.finish()
     }
 }

@@ -7,18 +7,17 @@ use volery::glam::DVec3;
 use volery::output::{ErrorMap, write_image};
 use volery::{
     Backend, BackendChoice, ColorMap, Data, Dial, Focus, GridData, How, Picture, PlaneView, Preset, Session,
-    Slicing, StackView, Thickness, View, ViewOptions, VolumeData, VoxelGrid, fit, open_backend, reference,
+    Slicing, StackView, Thickness, View, ViewOptions, VolumeData, VoxelGrid, fit, reference,
 };
 
 use crate::args::DemoArgs;
 use crate::outputs::Outputs;
 use crate::progress::Progress;
-use crate::quiet::hush_drivers;
 use crate::sheet::{Tile, contact_sheet};
-use crate::{Failure, say};
+use crate::{Failure, open, say};
 
 /// Width and height of a picture.
-const SIDE: u32 = 248;
+const SIDE: u32 = 228;
 
 /// Pictures in a row of the contact sheet: those of one scene.
 const COLUMNS: u32 = 7;
@@ -70,13 +69,11 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
     let is_picture = |name: &OsStr| Path::new(name).extension().is_some_and(|ending| ending == "png");
     Outputs::default().folder("-o", folder, is_picture).check([])?;
     let choice = BackendChoice::from(args.backend);
-    if choice.loads_drivers() {
-        hush_drivers();
-    }
+    let backend = open(choice)?;
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::of_file(folder, format_args!("cannot be made: {error}")))?;
     say("data            picture             ms a frame  pieces  max error      rmse")?;
-    let mut sheet = Sheet { folder, backend: open_backend(choice)?, tiles: Vec::new() };
+    let mut sheet = Sheet { folder, backend, tiles: Vec::new() };
     for scene in scenes() {
         sheet.draw_scene(&scene)?;
     }

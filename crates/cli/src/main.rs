@@ -23,6 +23,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
+use volery::{Backend, BackendChoice, open_backend};
 
 use crate::args::{Cli, Command};
 
@@ -107,6 +108,18 @@ fn run(cli: Cli) -> Result<(), Failure> {
         Command::Slice(args) => slice::run(&args),
         Command::Demo(args) => demo::run(&args),
     }
+}
+
+/// Opens who draws, and says it where a GPU was found that does not.
+fn open(choice: BackendChoice) -> Result<Box<dyn Backend>, Failure> {
+    if choice.loads_drivers() {
+        quiet::hush_drivers();
+    }
+    let backend = open_backend(choice)?;
+    if let Some(reason) = backend.device().in_place_of {
+        complain(&format!("note: drawn on the CPU: {reason}"));
+    }
+    Ok(backend)
 }
 
 /// The first paragraph of a message of clap in one line, what may have been meant, and where to read more.

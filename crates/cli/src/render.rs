@@ -8,7 +8,7 @@ use volery::io::scene_file::{SceneBackend, SceneFile, SceneTechnique};
 use volery::output::write_image;
 use volery::{
     Backend, BackendChoice, Data, How, Input, InputData, InputOptions, Picture, RenderError, Session, Step,
-    View, VolumeData, VoxelGrid, open_backend,
+    View, VolumeData, VoxelGrid,
 };
 
 mod empty;
@@ -19,7 +19,7 @@ use crate::args::{RenderArgs, Transfer, numbered};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
 use crate::wanted::{self, Given};
-use crate::{Failure, quiet, say};
+use crate::{Failure, open, say};
 
 /// Pictures that `--progressive` writes, about.
 const PROGRESSIVE_STEPS: usize = 8;
@@ -62,10 +62,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         Some(SceneBackend::Software) => BackendChoice::Software,
         Some(SceneBackend::Wgpu) => BackendChoice::Wgpu,
     };
-    if choice.loads_drivers() {
-        quiet::hush_drivers();
-    }
-    let mut backend = open_backend(choice)?;
+    let mut backend = open(choice)?;
     let backend = backend.as_mut();
     let input = {
         let _busy = Progress::spinner("reading");

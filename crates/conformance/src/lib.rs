@@ -24,6 +24,7 @@
 
 mod compositing;
 mod cubes;
+mod hand_on;
 mod levels;
 mod matter;
 mod oracle;
@@ -215,6 +216,7 @@ properties! { $
         nothing_that_was_kept_is_stale
         cameras_that_move_upload_nothing
         finished_parts_are_told_once
+        times_of_parts_add_up
         pictures_are_begun_and_ended;
 }
 

@@ -1,6 +1,7 @@
 //! Pictures in parts: the same picture whatever it is cut into, and what is refused.
 
 use glam::DVec3;
+use volery_scene::mesh::shade;
 use volery_scene::{Camera, Plane, TriangleMesh};
 
 use volery_frame::{
@@ -9,6 +10,7 @@ use volery_frame::{
     Sheet, SheetTransfer, SheetVertices, Sheets, TexelType, Texels, Thickness, UploadedBytes,
 };
 
+use super::STOP_TRANSMITTANCE;
 use super::oracle::{assert_same_bits, assert_shows_something, difference};
 use super::world::{
     BACKGROUND, BACKGROUND_F64, OwnedBrick, Storage, Volume, draw_bricks, draw_resident, hold,
@@ -20,6 +22,19 @@ const SIZE: [u32; 2] = [97, 61];
 /// Root mean square difference between a picture and the same in parts.
 const MAX_RMSE: f64 = 1e-6;
 
+/// What worlds are painted in, and what stands before them.
+const PAINTS: [[f64; 3]; 2] = [[0.9, 0.1, 0.2], [0.1, 0.3, 0.8]];
+const SCREENS: [[f64; 3]; 2] = [[0.2, 0.8, 0.1], [0.8, 0.7, 0.3]];
+
+/// Largest difference of a channel where all is opaque: a ray that stops.
+const MAX_PAINT: f64 = STOP_TRANSMITTANCE + 5e-5;
+
+/// Pixels per axis of a picture whose parts are timed, times that each is drawn, and the least share of its device's
+/// seconds that parts must have: of planes, which are fast, a fifth goes to the picture's beginning and end.
+const TIMED_SIZE: u32 = 384;
+const NUM_TIMED: usize = 5;
+const MIN_TIMED: f64 = 0.7;
+
 /// Everything that can be seen of one volume.
 struct World {
     camera: Camera,
@@ -29,6 +44,7 @@ struct World {
     ray_transfer: RayTransfer,
     point_transfer: PointTransfer,
     planes: [Plane; 3],
+    shows_bricks: bool,
     /// Back to front, as are the sheets.
     cubes: Vec<Cube>,
     cubes_revision: Revision,
@@ -83,6 +99,7 @@ impl World {
         Self {
             ray_transfer: volume.integrated(&function),
             point_transfer: PointTransfer::new(&function, &volume.layout),
+            shows_bricks: true,
             planes: normals.map(|normal| Plane::through(middle, normal)),
             cubes: cubes(&volume),
             cubes_revision: Revision::new(),
@@ -103,17 +120,27 @@ impl World {
         }
     }
 
-    /// Another one to look at where this was.
-    fn changed(mut self) -> Self {
-        let function = transfer(&[[0.0, 0.2, 0.9, 0.3, 0.02], [1.0, 0.9, 0.9, 0.1, 0.3]], 4.0);
+    /// All opaque and of one colour; meshes cover the left half of the picture, nearer than all else, in another.
+    fn painted(mut self, number: usize) -> Self {
+        let [r, g, b] = PAINTS[number];
+        let function = transfer(&[[0.0, r, g, b, 1.0], [1.0, r, g, b, 1.0]], 1.0);
         self.ray_transfer = self.volume.integrated(&function);
         self.point_transfer = PointTransfer::new(&function, &self.volume.layout);
-        self.sheet_transfer = SheetTransfer::new(&function, [0.0, 1.0]);
-        self.cubes.iter_mut().for_each(|cube| cube.color.reverse());
-        self.points.iter_mut().for_each(|point| point[3] = 1.0 - point[3]);
-        let points = self.meshes[0].points().iter().map(|&point| point * 0.7).collect();
-        let moved = TriangleMesh::new(points, vec![[0, 1, 2]], [0.9, 0.2, 0.1]);
-        self.meshes[0] = moved.expect("the suite's meshes are right");
+        self.shows_bricks = false;
+        for cube in &mut self.cubes {
+            (cube.color, cube.extinction) = (PAINTS[number].map(|channel| channel as f32), f32::INFINITY);
+        }
+        // Of sheets both the values and the function matter: each with another's would be gray.
+        let mut points = [[0.25, 0.5, 0.5, 0.5, 1.0], [0.75, 0.5, 0.5, 0.5, 1.0]];
+        points[number][1..4].copy_from_slice(&PAINTS[number]);
+        self.points.iter_mut().for_each(|point| point[3] = points[number][0] as f32);
+        self.sheet_transfer = SheetTransfer::new(&transfer(&points, 1.0), [0.0, 1.0]);
+        let [right, up, forward] = self.camera.axes();
+        let depth = 0.05 * (self.camera.target - self.camera.eye).length();
+        let corner = |x: f64, y: f64| self.camera.eye + depth * (forward + right * (x - 0.01) + up * y);
+        let corners = vec![corner(0.0, -4.0), corner(0.0, 4.0), corner(-8.0, 0.0)];
+        let screen = TriangleMesh::new(corners, vec![[0, 1, 2]], SCREENS[number]);
+        self.meshes = [(); 2].map(|()| screen.clone().expect("the suite's meshes are right"));
         self
     }
 
@@ -137,7 +164,7 @@ impl World {
                 transfer: &self.point_transfer,
                 sampling: Sampling::Linear,
                 is_transparent: true,
-                shows_bricks: true,
+                shows_bricks: self.shows_bricks,
             }),
             Kind::Cubes => Content::Cubes(Cubes {
                 // A part of the list is another list.
@@ -326,28 +353,26 @@ pub fn evicted_bricks_leave_room_for_others(backend: &mut dyn Backend) {
 }
 
 /// Tables, cubes, sheets and surfaces that change under revisions of their own, and back: nothing that was kept shows in
-/// place of another.
+/// place of another. All is opaque, so what each pixel shows is known.
 pub fn nothing_that_was_kept_is_stale(backend: &mut dyn Backend) {
-    let mut make = |is_changed: bool| {
-        let world = World::new(backend, false);
-        if is_changed { world.changed() } else { world }
-    };
-    let [worlds, others] = [(); 2].map(|()| [false, true].map(&mut make));
-    for kind in KINDS {
-        let mut show = |world: &World| world.draw(backend, &world.meshes, world.whole(kind)).image;
-        // Made only for this, so that nobody has seen them.
-        let expected = others.each_ref().map(&mut show);
-        // Contents and surfaces each make a difference, which what is stale would not.
-        let [first, second] =
-            others.each_ref().map(|world| world.draw(backend, &[], world.whole(kind)).image);
-        assert!(first != second, "{kind:?}: two contents look alike");
-        let of_first = |world: &World| others[0].draw(backend, &world.meshes, others[0].whole(kind)).image;
-        let [first, second] = others.each_ref().map(of_first);
-        assert!(first != second, "{kind:?}: two surfaces look alike");
-        let mut show = |world: &World| world.draw(backend, &world.meshes, world.whole(kind)).image;
-        for (round, number) in [0, 0, 1, 1, 0, 1].into_iter().enumerate() {
-            let image = show(&worlds[number]);
-            assert_same_bits(&format!("{kind:?} of world {number}, {round}"), &image, &expected[number]);
+    let worlds = [0, 1].map(|number| World::new(backend, false).painted(number));
+    let [width, height] = SIZE;
+    let [left, middle] = [width / 4, width / 2].map(|column| [column, height / 2]);
+    let ray = worlds[0].camera.rays(width, height).pixel(left[0], left[1]);
+    let lit = shade(worlds[0].camera.axes()[2].dot(ray.direction));
+    for kind in KINDS.into_iter().filter(|&kind| kind != Kind::Sheets) {
+        for (content, screen) in [(0, 0), (0, 0), (1, 0), (1, 1), (0, 1), (0, 0), (1, 1), (1, 0), (0, 1)] {
+            let image =
+                worlds[screen].draw(backend, &worlds[screen].meshes, worlds[content].whole(kind)).image;
+            for ([column, row], expected) in
+                [(left, SCREENS[screen].map(|channel| channel * lit)), (middle, PAINTS[content])]
+            {
+                let found = image.pixels[(row * width + column) as usize];
+                let what = format!("{kind:?} of world {content} behind meshes of world {screen}");
+                let error = (0..3).map(|i| (f64::from(found[i]) - expected[i]).abs()).fold(0.0, f64::max);
+                println!("{what}: pixel {column}, {row} off by {error:.1e} (threshold {MAX_PAINT:e})");
+                assert!(error <= MAX_PAINT, "{what}: {column}, {row} is {found:?}, expected {expected:?}");
+            }
         }
     }
 }
@@ -400,6 +425,44 @@ pub fn finished_parts_are_told_once(backend: &mut dyn Backend) {
         let is_time = |seconds: f64| seconds >= 0.0 && seconds.is_finite();
         assert!(told.iter().all(|part| part.device_seconds.is_none_or(is_time)), "{told:?}");
         assert_eq!(backend.finished(), [], "parts told twice");
+    }
+}
+
+/// In 1, 7 and 50 parts: the device's seconds of parts are those of the picture, but for what comes before the first part
+/// and after the last. A backend without a clock has none to compare.
+pub fn times_of_parts_add_up(backend: &mut dyn Backend) {
+    let world = World::new(backend, false);
+    let view = PictureView { width: TIMED_SIZE, height: TIMED_SIZE, ..world.view(&[]) };
+    for kind in KINDS {
+        let mut of_one_part = None;
+        for num in [1, 7, 50] {
+            let parts = world.cut(kind, num);
+            let mut timed = || {
+                let whole = draw_parts(backend, &view, &parts).device_seconds;
+                let told = backend.finished();
+                assert_eq!(told.len(), num, "{kind:?}: parts that were told");
+                let each = told.iter().map(|part| part.device_seconds);
+                Some((each.sum::<Option<f64>>()?, whole?))
+            };
+            timed();
+            let Some(mut times) = (0..NUM_TIMED).map(|_| timed()).collect::<Option<Vec<_>>>() else {
+                println!("{kind:?}: no clock");
+                return;
+            };
+            times.sort_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+            let (sum, whole) = times[NUM_TIMED / 2];
+            let share = sum / whole;
+            println!(
+                "{kind:?} in {num} parts: {:.2} ms of {:.2} ms, {share:.3} (threshold {MIN_TIMED} to 1), {:.2} times one part",
+                1e3 * sum,
+                1e3 * whole,
+                sum / *of_one_part.get_or_insert(sum)
+            );
+            assert!(
+                (MIN_TIMED..=1.0 + 1e-9).contains(&share),
+                "{kind:?} in {num} parts: parts took {share} of the picture, expected {MIN_TIMED} to 1"
+            );
+        }
     }
 }
 

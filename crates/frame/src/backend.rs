@@ -31,6 +31,8 @@ pub struct Device {
     pub kind: DeviceKind,
     /// Its name for people.
     pub name: String,
+    /// Why a better one was found and does not draw.
+    pub in_place_of: Option<String>,
 }
 
 /// A part of a picture that the device has drawn.

@@ -29,6 +29,7 @@
 //! side of a triangle is seen.
 
 use glam::DVec3;
+pub use volery_scene::Quantization;
 use volery_scene::{Camera, Revision, TransferFunction};
 
 use crate::DrawError;
@@ -110,17 +111,6 @@ impl SheetVertices<'_> {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-}
-
-/// What the numbers of quantised vertices mean: `x = low + scale * i`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Quantization {
-    /// Of x, y, z relative to the origin, and of the value: what 0 stands for.
-    pub low: [f32; 4],
-    /// What one step stands for.
-    pub scale: [f32; 4],
-    /// What one step of 255 of a gradient's magnitude stands for.
-    pub magnitude_scale: f32,
 }
 
 /// Checks that numbers of vertices and triangles exist, and that there are as many gradients as vertices, or none.

@@ -106,6 +106,14 @@ impl<'a> Frustum<'a> {
             (deepest - point).dot(normal) < -self.slack
         })
     }
+
+    /// Whether a box, in world units, is inside with all that is in it: nothing of it is skipped.
+    pub fn holds(&self, [low, high]: [DVec3; 2]) -> bool {
+        self.planes.iter().all(|&(point, normal)| {
+            let shallowest = DVec3::select(normal.cmpgt(DVec3::ZERO), low, high);
+            (shallowest - point).dot(normal) >= -self.slack
+        })
+    }
 }
 
 impl Filter for Frustum<'_> {

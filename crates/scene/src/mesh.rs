@@ -92,10 +92,13 @@ impl TriangleMesh {
     }
 }
 
+/// The least share of its colour that a surface shows, and lit matter.
+pub const AMBIENT: f64 = 0.25;
+
 /// How much of its colour an opaque surface shows where the cosine of the angle between its normal and the ray is
 /// `cosine`: as a lamp at the eye lights it, never black.
 pub fn shade(cosine: f64) -> f64 {
-    0.25 + 0.75 * cosine.abs().min(1.0)
+    AMBIENT + (1.0 - AMBIENT) * cosine.abs().min(1.0)
 }
 
 #[cfg(test)]

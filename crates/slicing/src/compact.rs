@@ -215,7 +215,8 @@ impl CompactMesh {
         let gradients: Vec<DVec3> =
             gradients.map_or_else(Vec::new, |all| used.iter().map(|&node| all[node as usize]).collect());
         let magnitudes = gradients.iter().map(|gradient| gradient.length());
-        let quantization = Quantization::over(used.iter().map(place), values.iter().copied(), magnitudes)?;
+        let quantization =
+            quantize::quantization_over(used.iter().map(place), values.iter().copied(), magnitudes)?;
         let node = |(node, &value): (&u32, &f64)| quantization.point(place(node), value);
         self.nodes = used.iter().zip(&values).map(node).collect();
         self.gradients = gradients

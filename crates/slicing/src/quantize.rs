@@ -15,22 +15,12 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+pub use volery_scene::Quantization;
 
 use crate::mesh::{MeshSheet, RUN, SliceMesh};
 
 /// Steps of a coordinate and of the value.
 pub(crate) const STEPS: f64 = 65535.0;
-
-/// What quantised numbers mean: `x = low + scale * i`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Quantization {
-    /// Of x, y, z relative to the origin, and of the value: what 0 stands for.
-    pub low: [f32; 4],
-    /// What one step stands for.
-    pub scale: [f32; 4],
-    /// What one step of 255 of a gradient's magnitude stands for.
-    pub magnitude_scale: f32,
-}
 
 /// A [`SliceMesh`] in few bytes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -73,75 +63,40 @@ pub enum Error {
     },
 }
 
-impl Quantization {
-    /// For places relative to the origin, finite values among `values`, and magnitudes of gradients.
-    pub(crate) fn over(
-        places: impl IntoIterator<Item = DVec3>,
-        values: impl IntoIterator<Item = f64>,
-        magnitudes: impl IntoIterator<Item = f64>,
-    ) -> Result<Self, Error> {
-        let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let join = |[low, high]: [f64; 2], x: f64| [low.min(x), high.max(x)];
-        let mut ranges = [none; 4];
-        for place in places {
-            for (range, x) in ranges.iter_mut().zip(place.to_array()) {
-                // A range that knows a place that is nowhere is not finite.
-                *range = join(*range, if x.is_nan() { f64::INFINITY } else { x });
-            }
+/// For places relative to the origin, finite values among `values`, and magnitudes of gradients.
+pub(crate) fn quantization_over(
+    places: impl IntoIterator<Item = DVec3>,
+    values: impl IntoIterator<Item = f64>,
+    magnitudes: impl IntoIterator<Item = f64>,
+) -> Result<Quantization, Error> {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    let join = |[low, high]: [f64; 2], x: f64| [low.min(x), high.max(x)];
+    let mut ranges = [none; 4];
+    for place in places {
+        for (range, x) in ranges.iter_mut().zip(place.to_array()) {
+            // A range that knows a place that is nowhere is not finite.
+            *range = join(*range, if x.is_nan() { f64::INFINITY } else { x });
         }
-        ranges[3] = values.into_iter().filter(|value| value.is_finite()).fold(none, join);
-        let mut found = Self::default();
-        for (part, [low, high]) in ranges.into_iter().enumerate() {
-            if low > high && high == f64::NEG_INFINITY {
-                continue;
-            }
-            let scale = ((high - low) / STEPS) as f32;
-            if !(low as f32).is_finite() || !(high as f32).is_finite() || !scale.is_finite() {
-                let bounds = |end: usize| DVec3::from_array([0, 1, 2].map(|part: usize| ranges[part][end]));
-                return Err(match part {
-                    3 => Error::Values { low, high },
-                    _ => Error::Bounds { low: bounds(0), high: bounds(1) },
-                });
-            }
-            (found.low[part], found.scale[part]) = (low as f32, scale);
+    }
+    ranges[3] = values.into_iter().filter(|value| value.is_finite()).fold(none, join);
+    let mut found = Quantization::default();
+    for (part, [low, high]) in ranges.into_iter().enumerate() {
+        if low > high && high == f64::NEG_INFINITY {
+            continue;
         }
-        let finite = magnitudes.into_iter().filter(|magnitude| magnitude.is_finite());
-        found.magnitude_scale = ((finite.fold(0.0, f64::max) / 255.0) as f32).min(f32::MAX);
-        Ok(found)
+        let scale = ((high - low) / STEPS) as f32;
+        if !(low as f32).is_finite() || !(high as f32).is_finite() || !scale.is_finite() {
+            let bounds = |end: usize| DVec3::from_array([0, 1, 2].map(|part: usize| ranges[part][end]));
+            return Err(match part {
+                3 => Error::Values { low, high },
+                _ => Error::Bounds { low: bounds(0), high: bounds(1) },
+            });
+        }
+        (found.low[part], found.scale[part]) = (low as f32, scale);
     }
-
-    /// The nearest numbers; a value that is not a number is 0.
-    pub(crate) fn point(&self, place: DVec3, value: f64) -> [u16; 4] {
-        let parts = [place.x, place.y, place.z, value];
-        std::array::from_fn(|part| {
-            let scale = f64::from(self.scale[part]);
-            let step = if scale > 0.0 { (parts[part] - f64::from(self.low[part])) / scale } else { 0.0 };
-            // A cast keeps to the range, and makes 0 of what is no number.
-            step.round() as u16
-        })
-    }
-
-    /// The nearest numbers for a direction of unit length, or zero, and a magnitude.
-    pub(crate) fn gradient(&self, direction: DVec3, magnitude: f64) -> [i8; 4] {
-        let scale = f64::from(self.magnitude_scale);
-        let step = if scale > 0.0 { (magnitude / scale).round() as u8 } else { 0 };
-        let [x, y, z] = direction.to_array().map(|part| (part * 127.0).round() as i8);
-        [x, y, z, step.cast_signed()]
-    }
-
-    /// Place relative to the origin.
-    pub fn place(&self, point: [u16; 4]) -> DVec3 {
-        DVec3::from_array([0, 1, 2].map(|part| self.part(point, part)))
-    }
-
-    /// The value.
-    pub fn value(&self, point: [u16; 4]) -> f64 {
-        self.part(point, 3)
-    }
-
-    fn part(&self, point: [u16; 4], part: usize) -> f64 {
-        f64::from(self.low[part]) + f64::from(self.scale[part]) * f64::from(point[part])
-    }
+    let finite = magnitudes.into_iter().filter(|magnitude| magnitude.is_finite());
+    found.magnitude_scale = ((finite.fold(0.0, f64::max) / 255.0) as f32).min(f32::MAX);
+    Ok(found)
 }
 
 impl QuantizedMesh {
@@ -152,7 +107,7 @@ impl QuantizedMesh {
     pub fn new(mesh: &SliceMesh) -> Result<Self, Error> {
         let split =
             |&[x, y, z, value]: &[f32; 4]| (DVec3::new(x.into(), y.into(), z.into()), f64::from(value));
-        let quantization = Quantization::over(
+        let quantization = quantization_over(
             mesh.points.iter().map(|point| split(point).0),
             mesh.points.iter().map(|point| split(point).1),
             mesh.gradients.iter().map(|gradient| f64::from(gradient[3])),

@@ -62,7 +62,7 @@ fn plane(criterion: &mut Criterion) {
     let normal = DVec3::new(0.3, 0.5, 0.81);
     let middle = DVec3::splat(f64::from(SAMPLES - 1) / 2.0);
     let planes = [Plane::through(middle, normal)];
-    // A sample per pixel of the smaller picture.
+    // A sample per pixel of the picture of 512 by 512.
     let camera = Camera {
         eye: middle - normal.normalize() * 1000.0,
         target: middle,
@@ -72,7 +72,7 @@ fn plane(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("oblique plane through 512^3 u8");
     for (name, low_corners) in [("full resolution", 0), ("blended", 0b0101_1010)] {
         bricks.iter_mut().for_each(|brick| brick.low_corners = low_corners);
-        for size in [512, 1024] {
+        for size in [64, 512, 1024] {
             let content = Content::Planes(Planes {
                 planes: &planes,
                 bricks: &bricks,

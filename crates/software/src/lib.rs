@@ -84,9 +84,13 @@ pub const MAX_BRICK_CELLS: u32 = 254;
 pub struct SoftwareBackend {
     level: Level,
     volume: Option<(VolumeLayout, Pool)>,
+    planes: plane::Kept,
     sheets: sheets::Kept,
     picture: Option<Target>,
+    /// What it took so far.
+    seconds: f64,
     finished: Vec<FinishedPart>,
+    in_place_of: Option<String>,
 }
 
 impl Default for SoftwareBackend {
@@ -101,8 +105,22 @@ impl SoftwareBackend {
         Self::of_level(Level::new())
     }
 
+    /// An executor that draws because something better does not, for this reason: its device says so.
+    pub fn in_place_of(reason: String) -> Self {
+        Self { in_place_of: Some(reason), ..Self::new() }
+    }
+
     fn of_level(level: Level) -> Self {
-        Self { level, volume: None, sheets: sheets::Kept::default(), picture: None, finished: Vec::new() }
+        Self {
+            level,
+            volume: None,
+            planes: plane::Kept::default(),
+            sheets: sheets::Kept::default(),
+            picture: None,
+            seconds: 0.0,
+            finished: Vec::new(),
+            in_place_of: None,
+        }
     }
 
     /// Adds a part to the picture; whether it is the only one makes no difference but to what ends early.
@@ -123,11 +141,14 @@ impl SoftwareBackend {
                 target.shown.add_rays();
             }
             (Content::Planes(planes), Some((layout, pool))) => {
+                let kept = &mut self.planes;
                 match pool {
-                    Pool::U8(bricks) => plane::draw::<_, 1>(level, target, planes, layout, bricks)?,
-                    Pool::U16(bricks) => plane::draw::<_, 1>(level, target, planes, layout, bricks)?,
-                    Pool::F32(bricks) => plane::draw::<_, 1>(level, target, planes, layout, bricks)?,
-                    Pool::Colors(bricks) => plane::draw::<_, 4>(level, target, planes, layout, bricks)?,
+                    Pool::U8(bricks) => plane::draw::<_, 1>(level, kept, target, planes, (layout, bricks))?,
+                    Pool::U16(bricks) => plane::draw::<_, 1>(level, kept, target, planes, (layout, bricks))?,
+                    Pool::F32(bricks) => plane::draw::<_, 1>(level, kept, target, planes, (layout, bricks))?,
+                    Pool::Colors(bricks) => {
+                        plane::draw::<_, 4>(level, kept, target, planes, (layout, bricks))?
+                    }
                 }
                 target.shown.add_planes();
             }
@@ -137,8 +158,9 @@ impl SoftwareBackend {
             }
         }
         let number = target.shown.num_parts - 1;
-        let device_seconds = Some(start.elapsed().as_secs_f64());
-        self.finished.push(FinishedPart { number, device_seconds });
+        let seconds = start.elapsed().as_secs_f64();
+        self.seconds += seconds;
+        self.finished.push(FinishedPart { number, device_seconds: Some(seconds) });
         Ok(number)
     }
 }
@@ -149,7 +171,8 @@ impl Backend for SoftwareBackend {
         let set = name.split('(').next().unwrap_or_default().to_lowercase();
         let threads = rayon::current_num_threads();
         let plural = if threads == 1 { "" } else { "s" };
-        Device { kind: DeviceKind::Software, name: format!("CPU, {set}, {threads} thread{plural}") }
+        let name = format!("CPU, {set}, {threads} thread{plural}");
+        Device { kind: DeviceKind::Software, name, in_place_of: self.in_place_of.clone() }
     }
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
@@ -194,10 +217,12 @@ impl Backend for SoftwareBackend {
     }
 
     fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
+        let start = Instant::now();
         self.picture = None;
         self.finished.clear();
         check_view(view, MAX_SIZE)?;
         self.picture = Some(Target::new(view));
+        self.seconds = start.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -210,8 +235,11 @@ impl Backend for SoftwareBackend {
     }
 
     fn finish(&mut self) -> Result<Drawn, DrawError> {
+        let start = Instant::now();
         let target = self.picture.take().ok_or(DrawError::NoPicture)?;
-        Ok(Drawn { image: target.image(self.level), device_seconds: None, ray_doubt: target.ray_doubt() })
+        let (image, ray_doubt) = (target.image(self.level), target.ray_doubt());
+        let device_seconds = Some(self.seconds + start.elapsed().as_secs_f64());
+        Ok(Drawn { image, device_seconds, ray_doubt })
     }
 
     fn draw(&mut self, frame: &Frame<'_>) -> Result<Drawn, DrawError> {

@@ -6,7 +6,9 @@
 use fearless_simd::{Level, dispatch, f32x16, i32x16, mask32x16, prelude::*};
 use volery_frame::plane_tiles::TILE as PLANE_TILE;
 use volery_frame::planes::{MAX_PLANES, outline_color, outline_coverage};
-use volery_frame::{BrickGrid, DrawError, PlaneTile, PlaneTiles, Planes, VolumeLayout};
+use volery_frame::{
+    BlendedBrick, BrickGrid, DrawError, PlaneTile, PlaneTiles, Planes, Revision, VolumeLayout,
+};
 
 use crate::brick::StoredBrick;
 use crate::math::axes;
@@ -20,6 +22,19 @@ use crate::texel::Texel;
 const HORIZON: f32 = 1e-12;
 
 const _: () = assert!(TILE.is_multiple_of(PLANE_TILE), "tiles of planes fill a tile");
+
+/// The grid of the last bricks that were placed, in the order in which they were.
+#[derive(Debug, Default)]
+pub(crate) struct Kept(Option<(Revision, Vec<BlendedBrick>, BrickGrid)>);
+
+impl Kept {
+    fn grid(&mut self, layout: &VolumeLayout, bricks: &[BlendedBrick]) -> &BrickGrid {
+        let is_same = |(volume, placed, _): &(_, Vec<_>, _)| *volume == layout.revision && placed == bricks;
+        let kept = self.0.take().filter(is_same);
+        let grid = || (layout.revision, bricks.to_vec(), BrickGrid::new(layout, bricks));
+        &self.0.insert(kept.unwrap_or_else(grid)).2
+    }
+}
 
 /// All that tiles share.
 struct Shared<'a, T> {
@@ -37,20 +52,20 @@ struct Shared<'a, T> {
 /// Draws a checked part of texels of `C` channels.
 pub(crate) fn draw<T: Texel, const C: usize>(
     level: Level,
+    kept: &mut Kept,
     target: &mut Target,
     content: &Planes<'_>,
-    layout: &VolumeLayout,
-    bricks: &Bricks<T>,
+    (layout, bricks): (&VolumeLayout, &Bricks<T>),
 ) -> Result<(), DrawError> {
     let missing = content.bricks.iter().find(|brick| !bricks.contains_key(&brick.placed.id));
     if let Some(brick) = missing {
         return Err(DrawError::NotResident { id: brick.placed.id });
     }
-    let grid = BrickGrid::new(layout, content.bricks);
+    let grid = kept.grid(layout, content.bricks);
     let stored: Vec<_> = grid.bricks().iter().filter_map(|brick| bricks.get(&brick.placed.id)).collect();
     let tiles = PlaneTiles::new(&target.view, content.planes, layout);
     let size = [target.view.width, target.view.height];
-    let (tiles, grid, stored) = (&tiles, &grid, stored.as_slice());
+    let (tiles, stored) = (&tiles, stored.as_slice());
     target.draw_tiles(|surfaces, _, first, tile| {
         let shared = Shared { size, surfaces, content, layout, tiles, grid, stored };
         dispatch!(level, simd => draw_tile::<_, T, C>(simd, &shared, first, tile));

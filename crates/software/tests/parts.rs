@@ -1,10 +1,7 @@
 //! A picture in parts has the bits of the whole one.
 
 use volery_conformance::pictures_in_parts_are_the_same;
-use volery_frame::{
-    Backend, Brick, BrickId, Content, Device, DrawError, Drawn, FinishedPart, Frame, Image, PictureView,
-    Revision, UploadError, UploadedBytes, VolumeLayout,
-};
+use volery_frame::{Backend, DrawError, Drawn, Frame, Image};
 use volery_software::SoftwareBackend;
 
 /// Keeps the pictures: each whole one, then what was made of it in parts.
@@ -14,49 +11,8 @@ struct Keeping {
 }
 
 impl Backend for Keeping {
-    fn device(&self) -> Device {
-        self.backend.device()
-    }
-
-    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
-        self.backend.set_volume(layout)
-    }
-
-    fn volume(&self) -> Option<Revision> {
-        self.backend.volume()
-    }
-
-    fn is_resident(&self, id: BrickId) -> bool {
-        self.backend.is_resident(id)
-    }
-
-    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
-        self.backend.upload(bricks)
-    }
-
-    fn evict(&mut self, bricks: &[BrickId]) {
-        self.backend.evict(bricks);
-    }
-
-    fn resident_bytes(&self) -> u64 {
-        self.backend.resident_bytes()
-    }
-
-    fn uploaded_bytes(&self) -> UploadedBytes {
-        self.backend.uploaded_bytes()
-    }
-
-    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
-        self.backend.begin(view)
-    }
-
-    fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
-        self.backend.draw_part(content)
-    }
-
-    fn finished(&mut self) -> Vec<FinishedPart> {
-        self.backend.finished()
-    }
+    volery_conformance::hand_on!(self, self.backend => device set_volume volume is_resident upload evict resident_bytes
+        uploaded_bytes begin draw_part finished);
 
     fn finish(&mut self) -> Result<Drawn, DrawError> {
         let drawn = self.backend.finish()?;

@@ -122,6 +122,9 @@ pub struct Backend {
     pub kind: &'static str,
     /// Name of the device.
     pub device: String,
+    /// Why a GPU that was found does not draw.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_place_of: Option<String>,
 }
 
 /// Size of a picture in pixels.
@@ -243,7 +246,7 @@ impl Backend {
             DeviceKind::Software => "software",
             DeviceKind::Gpu | DeviceKind::CpuDevice => "wgpu",
         };
-        Self { kind, device: device.name }
+        Self { kind, device: device.name, in_place_of: device.in_place_of }
     }
 }
 

@@ -92,5 +92,5 @@ fn rank(kind: wgpu::DeviceType) -> u32 {
 pub(crate) fn device_of(info: &wgpu::AdapterInfo) -> Device {
     let is_cpu = info.device_type == wgpu::DeviceType::Cpu;
     let kind = if is_cpu { DeviceKind::CpuDevice } else { DeviceKind::Gpu };
-    Device { kind, name: info.name.clone() }
+    Device { kind, name: info.name.clone(), in_place_of: None }
 }

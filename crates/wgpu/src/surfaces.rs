@@ -18,6 +18,7 @@ use std::ops::Range;
 use glam::DVec3;
 use volery_frame::{PictureView, Revision};
 use volery_scene::TriangleMesh;
+use volery_scene::mesh::AMBIENT;
 use volery_shaders::surfaces;
 
 use crate::bindings::{bind_group, bind_group_layout, buffer, pipeline_layout, shader_module};
@@ -25,6 +26,9 @@ use crate::gpu::{Failure, Gpu, Upload};
 use crate::jobs::Jobs;
 use crate::picture::{PictureTile, Tile};
 use crate::tiles::{Affine, TileView};
+
+// What the shader and the rest of the crates must mean alike.
+const _: () = assert!(surfaces::AMBIENT as f64 == AMBIENT);
 
 /// See the module's limits.
 const NEAR: f64 = 1e-9;

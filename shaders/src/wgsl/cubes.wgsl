@@ -8,6 +8,8 @@
 // per axis, a plane of the volume where the eye is far from it. Parallel rays are the case in which all places see
 // the eye in the same way.
 
+// import opacity
+
 struct Frame {
     // A position and 1 to clip coordinates, whose depth is half their w: there is no near plane.
     clip_x: vec4f,
@@ -63,12 +65,8 @@ const CLASS_SHIFT: u32 = 30;
 
 // Planes nearer to the eye than this go through it: 2^-60.
 const TINY: f32 = 8.67361737988403547e-19;
-// Nothing is seen through a greater depth.
-const OPAQUE_DEPTH: f32 = 100.0;
 // The greatest extinction, for infinity may not be multiplied.
 const MAX_EXTINCTION: f32 = 1e38;
-// Up to this depth, opacity is summed from its series.
-const SERIES_DEPTH: f32 = 0.25;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> cubes: array<Cube>;
@@ -190,13 +188,6 @@ fn fan(@builtin(vertex_index) vertex: u32, @builtin(instance_index) batch: u32) 
     let extinction = min(min(cube.extinction, MAX_EXTINCTION) * frame.unit_length, MAX_EXTINCTION);
     out.matter = vec4f(cube.red, cube.green, cube.blue, select(extinction, -extinction, place.is_around_eye));
     return out;
-}
-
-// 1 - exp(-depth). The series ends where its next term is 5e-8 of the sum; above, a difference loses 1e-6 at most.
-fn opacity_of(depth: f32) -> f32 {
-    let d = depth;
-    let thin = d * (1.0 - d / 2.0 * (1.0 - d / 3.0 * (1.0 - d / 4.0 * (1.0 - d / 5.0 * (1.0 - d / 6.0)))));
-    return select(1.0 - exp(-d), thin, d < SERIES_DEPTH);
 }
 
 @fragment

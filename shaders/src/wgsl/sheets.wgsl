@@ -6,6 +6,9 @@
 //
 // Opacity may be below zero: of matter that is taken away in front of other matter.
 
+// import opacity
+// import unit
+
 struct Frame {
     // A place and 1 to clip coordinates, whose depth is half their w: there is no near plane.
     clip_x: vec4f,
@@ -68,10 +71,6 @@ const FALLING: u32 = 2;
 const MIN_COSINE: f32 = 1e-30;
 // As the frame has it.
 const MAX_STRIP_DEPTH: f32 = 5.0;
-// Nothing is seen through a greater depth.
-const OPAQUE_DEPTH: f32 = 100.0;
-// Up to this depth, opacity is summed from its series.
-const SERIES_DEPTH: f32 = 0.25;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 // Of each vertex x, y, z and the value: bits of floats, or unsigned 16-bit integers.
@@ -169,18 +168,9 @@ fn classify(value: f32, magnitude: f32) -> vec4f {
 
 // The share of the colour that light leaves, on either side. A direction of zero has no shade.
 fn shade(direction: vec3f) -> f32 {
-    let longest = max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
-    if !(longest > 0.0) {
-        return 1.0;
-    }
-    return frame.ambient + frame.diffuse * abs(dot(normalize(direction / longest), frame.toward_light));
-}
-
-// 1 - exp(-depth). The series ends where its next term is 5e-8 of the sum; beyond, a difference loses 1e-6 at most.
-fn opacity_of(depth: f32) -> f32 {
-    let d = depth;
-    let thin = d * (1.0 - d / 2.0 * (1.0 - d / 3.0 * (1.0 - d / 4.0 * (1.0 - d / 5.0 * (1.0 - d / 6.0)))));
-    return select(1.0 - exp(-d), thin, abs(d) < SERIES_DEPTH);
+    let rising = unit(direction);
+    let lit = frame.ambient + frame.diffuse * abs(dot(rising, frame.toward_light));
+    return select(lit, 1.0, all(rising == vec3f(0.0)));
 }
 
 // Of a slab half before and half behind a place, or of what is no slab and lies there, the share before a surface.

@@ -6,6 +6,8 @@
 // interpolated but the depth for the comparison, which is 1 at the nearest corner in front of the eye and 0 at the
 // farthest.
 
+// import unit
+
 struct Frame {
     // A place and 1 to clip coordinates.
     clip_x: vec4f,
@@ -24,7 +26,7 @@ struct Frame {
     toward_dy: vec3f,
 }
 
-// The least share of its colour that a surface shows.
+// The least share of its colour that a surface shows: as the scene has it.
 const AMBIENT: f32 = 0.25;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -46,15 +48,6 @@ struct Vertex {
 fn corner_of(triangle: u32, corner: u32) -> vec3f {
     let at = 9u * triangle + 3u * corner;
     return vec3f(corners[at], corners[at + 1u], corners[at + 2u]);
-}
-
-// Of length 1 also where lengths have no square in 32 bits.
-fn unit(v: vec3f) -> vec3f {
-    let longest = max(max(abs(v.x), abs(v.y)), abs(v.z));
-    if !(longest > 0.0) {
-        return vec3f(0.0);
-    }
-    return normalize(v / longest);
 }
 
 @vertex

@@ -8,10 +8,7 @@ use volery::{
     BackendChoice, Camera, ControlPoint, Dial, How, Projection, Thickness, TransferFunction, View,
     ViewOptions, VolumeData,
 };
-use volery_frame::{
-    Backend, Brick, BrickId, Content, Cube, Device, DrawError, Drawn, FinishedPart, PictureView, Revision,
-    UploadError, UploadedBytes, VolumeLayout,
-};
+use volery_frame::{Backend, Content, Cube, DrawError, Revision, VolumeLayout};
 use volery_reference::Image;
 use volery_scene::{Ray, VoxelGrid};
 use volery_software::SoftwareBackend;
@@ -24,54 +21,13 @@ struct Keeping {
 }
 
 impl Backend for Keeping {
-    fn device(&self) -> Device {
-        self.backend.device()
-    }
-
-    fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
-        self.backend.set_volume(layout)
-    }
-
-    fn volume(&self) -> Option<Revision> {
-        self.backend.volume()
-    }
-
-    fn is_resident(&self, id: BrickId) -> bool {
-        self.backend.is_resident(id)
-    }
-
-    fn upload(&mut self, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
-        self.backend.upload(bricks)
-    }
-
-    fn evict(&mut self, bricks: &[BrickId]) {
-        self.backend.evict(bricks);
-    }
-
-    fn resident_bytes(&self) -> u64 {
-        self.backend.resident_bytes()
-    }
-
-    fn uploaded_bytes(&self) -> UploadedBytes {
-        self.backend.uploaded_bytes()
-    }
-
-    fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
-        self.backend.begin(view)
-    }
+    volery_conformance::hand_on!(self, self.backend => device set_volume volume is_resident upload evict resident_bytes
+        uploaded_bytes begin finished finish);
 
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
         let Content::Cubes(cubes) = content else { panic!("fans draw cubes") };
         *self.kept.lock().unwrap() = cubes.cubes.to_vec();
         self.backend.draw_part(content)
-    }
-
-    fn finished(&mut self) -> Vec<FinishedPart> {
-        self.backend.finished()
-    }
-
-    fn finish(&mut self) -> Result<Drawn, DrawError> {
-        self.backend.finish()
     }
 }
 
@@ -426,4 +382,39 @@ fn triangles_are_those_of_the_fans() {
         println!("from {eye}: {expected} triangles of {} cubes", report.work.nodes.unwrap());
         assert_eq!(report.work.triangles, Some(expected), "from {eye}, orthographic {orthographic}");
     }
+}
+
+#[test]
+fn a_list_of_cubes_that_serves_again_is_the_one_of_a_new_session() {
+    let grid = volery_data::marschner_lobb_u8(21);
+    let (mut session, kept) = software(grid.clone());
+    let middle = grid.extent() / 2.0;
+    let mut num_cubes = 0;
+    // Eyes that go through planes between voxels one by one, in and out of the volume and of its slabs; now and then the
+    // rays are parallel, the view is narrow, the tolerance another.
+    for step in 0..90_i32 {
+        let along = f64::from(step / 2) / 15.0 - 1.5;
+        let eye = middle + grid.extent() * DVec3::new(along, 0.3 - 0.7 * along, 1.6 - along.abs());
+        let mut camera = Camera { up: DVec3::Y, ..perspective(eye, middle + 0.01, 60.0) };
+        match step % 5 {
+            3 => camera.projection = Projection::Orthographic { height: 60.0 },
+            4 => camera.projection = Projection::Perspective { fov_y_deg: 12.0 },
+            _ => {}
+        }
+        let dial = Dial::Tolerance(if step % 8 < 6 { 0.1 } else { 0.02 });
+        let view = View { camera, dial, ..whole_view(&session) };
+        draw(&mut session, &view);
+        let (mut fresh, expected) = software(grid.clone());
+        draw(&mut fresh, &view);
+        let (found, expected) = (kept.lock().unwrap(), expected.lock().unwrap());
+        assert!(
+            *found == *expected,
+            "step {step}: {} cubes, {} of a new session",
+            found.len(),
+            expected.len()
+        );
+        num_cubes += found.len();
+    }
+    println!("{num_cubes} cubes");
+    assert!(num_cubes > 90_000, "{num_cubes} cubes");
 }

@@ -8,6 +8,13 @@
 //! is exact from any eye, inside the volume too: a plane between children has the eye on one side, and nothing on the
 //! other can hide what is on this (the argument of `volery_octree::order`, backwards).
 //!
+//! # Cameras that move
+//! The order depends on the eye by how many planes between voxels lie below it along each axis, and on the way of
+//! parallel rays by signs: so it is the same from everywhere in one octant outside the slabs of the cubes' box. The cubes depend on
+//! the eye only where some are outside the view. So the last list serves again, under its revision, where that order is
+//! the same and all of it is inside the view, and is sent to no device again: it is the one that a walk would make.
+//!
+//! # Matter
 //! What matter is drawn is that of the mean: colour and extinction of the transfer function there, classified in
 //! f64. Where the mean is transparent though some voxels are not, nothing is drawn: that is the price of a tolerance.
 //!
@@ -22,9 +29,12 @@
 //! # Non-goals
 //! Colour samples; volumes of more than [`MAX_DIM`] samples along an axis, whose cubes 16 bits cannot number.
 
-use glam::DVec3;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
-use volery_frame::{Cube, Thickness, VolumeLayout};
+use volery_frame::{Cube, Revision, Thickness, VolumeLayout};
 use volery_octree::{Frustum, Viewpoint};
 use volery_pyramid::{CubeTree, Layout};
 use volery_scene::{Camera, Projection, Sample, TransferFunction, VoxelGrid, for_samples};
@@ -47,10 +57,37 @@ const CULLED_LEVEL: u32 = 3;
 /// Levels below the root at which the walk is shared among threads.
 const SHARED_LEVELS: u32 = 3;
 
-/// The technique, with the tree of cubes in the last encoding.
+/// The technique, with the tree of cubes in the last encoding, and the last list of them.
 #[derive(Default)]
 pub(crate) struct Fans {
     tree: Kept<Encoding, CubeTree>,
+    list: Option<List>,
+}
+
+/// Cubes of which none was left out for being outside the view.
+struct List {
+    made_of: (Encoding, TransferFunction, f64),
+    order: [usize; 3],
+    revision: Revision,
+    cubes: Arc<Vec<Cube>>,
+    /// Of all of them, on the lattice.
+    lattice_bounds: [IVec3; 2],
+    spacing: DVec3,
+}
+
+impl List {
+    fn bounds(&self) -> [DVec3; 2] {
+        self.lattice_bounds.map(|corner| corner.as_dvec3() * self.spacing / 2.0)
+    }
+
+    /// Whether a walk from there goes the same way: planes that no cubes lie on both sides of do not matter.
+    fn is_ordered_for(&self, order: [usize; 3]) -> bool {
+        let [low, high] = self.lattice_bounds.map(|corner| corner.to_array().map(|plane| plane as usize));
+        (0..3).all(|axis| {
+            let inner = |number: usize| number.clamp(low[axis].div_ceil(2), high[axis] / 2);
+            inner(order[axis]) == inner(self.order[axis])
+        })
+    }
 }
 
 impl Technique<VolumeData> for Fans {
@@ -73,6 +110,10 @@ impl Technique<VolumeData> for Fans {
         Ok(())
     }
 
+    fn forget_view(&mut self) {
+        self.list = None;
+    }
+
     fn prepare(&mut self, volume: &VolumeData) {
         self.tree_for(volume, volume.store());
     }
@@ -82,10 +123,29 @@ impl Technique<VolumeData> for Fans {
         let store = volume.store_for(transfer);
         let tree = self.tree_for(volume, store);
         let tolerance = volume.tolerance(view.dial).unwrap_or(0.0);
-        let of_volume = (volume.grid(), &*tree, volume.source().layout());
-        let cubes = cubes(of_volume, store.encoding, (view, transfer), tolerance);
+        let layout = volume.source().layout();
+        let order = order(Viewpoint::of(&view.camera, layout), volume.grid().dims());
+        let made_of = (store.encoding, transfer.clone(), tolerance);
+        let frustum = Frustum::new(layout, &view.camera, view.width, view.height);
+        let serves = |list: &&List| {
+            list.made_of == made_of && list.is_ordered_for(order) && frustum.holds(list.bounds())
+        };
+        let (revision, cubes) = match self.list.as_ref().filter(serves) {
+            Some(list) => (Some(list.revision), list.cubes.clone()),
+            None => {
+                let of_volume = (volume.grid(), &*tree, layout);
+                let (cubes, is_whole) = cubes(of_volume, store.encoding, (view, transfer), tolerance);
+                let cubes = Arc::new(cubes);
+                self.list = (is_whole && !cubes.is_empty()).then(|| {
+                    let (cubes, lattice_bounds) = (cubes.clone(), lattice_bounds(&cubes, &store.layout));
+                    let spacing = store.layout.spacing;
+                    List { made_of, order, revision: Revision::new(), cubes, lattice_bounds, spacing }
+                });
+                (self.list.as_ref().map(|list| list.revision), cubes)
+            }
+        };
         let mut by_level = Vec::new();
-        for cube in &cubes {
+        for cube in &*cubes {
             let level = usize::from(cube.level);
             if by_level.len() <= level {
                 by_level.resize(level + 1, 0);
@@ -98,7 +158,7 @@ impl Technique<VolumeData> for Fans {
             triangles: Some(num_triangles(&cubes, &store.layout, &view.camera)),
             ..Work::default()
         };
-        let drawing = Drawing::Cubes { cubes, thickness };
+        let drawing = Drawing::Cubes { revision, cubes, thickness };
         Ok(Plan { drawing, store: Some((store, Vec::new())), work, bound_max: None, geometry_seconds: None })
     }
 
@@ -113,10 +173,34 @@ impl Technique<VolumeData> for Fans {
 }
 
 impl Fans {
-    fn tree_for(&mut self, volume: &VolumeData, store: Store) -> std::sync::Arc<CubeTree> {
+    fn tree_for(&mut self, volume: &VolumeData, store: Store) -> Arc<CubeTree> {
         let Encoding { scale, offset, .. } = store.encoding;
         self.tree.get(&store.encoding, || CubeTree::build(volume.grid(), scale, offset))
     }
+}
+
+/// What of a viewpoint decides the order of cubes: how many of the planes between voxels lie below the eye along each
+/// axis. Parallel rays see as from far away.
+fn order(viewpoint: Viewpoint, dims: [usize; 3]) -> [usize; 3] {
+    std::array::from_fn(|axis| {
+        let most = dims[axis];
+        match viewpoint {
+            Viewpoint::Direction(direction) => most * usize::from(direction[axis] < 0.0),
+            Viewpoint::Eye(eye) => {
+                // Planes are half way between whole numbers; what is left of one is exact.
+                let whole = eye[axis].floor();
+                let number = whole + f64::from(u8::from(eye[axis] - whole > 0.5));
+                (number.clamp(0.0, most as f64)) as usize
+            }
+        }
+    })
+}
+
+/// The box around cubes.
+fn lattice_bounds(cubes: &[Cube], layout: &VolumeLayout) -> [IVec3; 2] {
+    let bounds = |cube: &Cube| cube.lattice_bounds(layout).map(IVec3::from_array);
+    let join = |a: [IVec3; 2], b: [IVec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+    cubes.par_iter().map(bounds).reduce(|| [IVec3::MAX, IVec3::MIN], join)
 }
 
 /// How many triangles the fans of cubes have: ten for a cube of which one face is toward the eye, else twelve
@@ -139,14 +223,14 @@ fn num_triangles(cubes: &[Cube], layout: &VolumeLayout, camera: &Camera) -> usiz
     cubes.par_iter().map(triangles).sum()
 }
 
-/// Chooses, classifies and orders cubes, back to front. `tree` is that of `grid` in the encoding; the tolerance is in
-/// data units.
+/// Chooses, classifies and orders cubes, back to front, and tells whether none was left out for being outside the view.
+/// `tree` is that of `grid` in the encoding; the tolerance is in data units.
 fn cubes(
     (grid, tree, layout): (&VoxelGrid, &CubeTree, &Layout),
     Encoding { scale, offset, .. }: Encoding,
     (view, transfer): (&View, &TransferFunction),
     tolerance: f64,
-) -> Vec<Cube> {
+) -> (Vec<Cube>, bool) {
     let of_texel = |texel: f32| {
         let (color, opacity) = transfer.classify(offset + scale * f64::from(texel));
         (color.map(|c| c as f32), transfer.extinction_of_opacity(opacity) as f32)
@@ -171,8 +255,9 @@ fn cubes(
             frustum: Frustum::new(layout, &view.camera, view.width, view.height),
             spacing: layout.spacing(),
             domain: layout.domain(),
+            is_whole: AtomicBool::new(true),
         };
-        walk.run()
+        (walk.run(), walk.is_whole.into_inner())
     })
 }
 
@@ -195,6 +280,8 @@ struct Walk<'a, V, C, T> {
     spacing: DVec3,
     /// In finest-sample coordinates, from the origin.
     domain: DVec3,
+    /// Whether nothing was found outside the view.
+    is_whole: AtomicBool,
 }
 
 impl<V, C, T> Walk<'_, V, C, T>
@@ -249,6 +336,7 @@ where
             return Visit::Skip;
         }
         if level >= CULLED_LEVEL && !self.frustum.may_meet(self.world_bounds((level, index))) {
+            self.is_whole.store(false, Ordering::Relaxed);
             return Visit::Skip;
         }
         if f64::from(cube.error()) < self.tolerance {

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use volery_frame::{
     BlendedBrick, Content, Cube, Cubes, JoinedBrick, Light, Planes, PointTransfer, RayTransfer, Rays,
-    Sampling, Sheet, SheetTransfer, Thickness,
+    Revision, Sampling, Sheet, SheetTransfer, Thickness,
 };
 use volery_pyramid::Node;
 use volery_scene::Plane;
@@ -118,8 +118,10 @@ pub enum Drawing {
     },
     /// Cubes of constant matter.
     Cubes {
+        /// Names the list, where it may serve again.
+        revision: Option<Revision>,
         /// Back to front.
-        cubes: Vec<Cube>,
+        cubes: Arc<Vec<Cube>>,
         /// How the length of a ray in them is found.
         thickness: Thickness,
     },
@@ -151,8 +153,8 @@ impl Drawing {
                     shows_bricks: *shows_bricks,
                 })
             }
-            Self::Cubes { cubes, thickness } => {
-                Content::Cubes(Cubes { revision: None, cubes, thickness: *thickness })
+            Self::Cubes { revision, cubes, thickness } => {
+                Content::Cubes(Cubes { revision: *revision, cubes, thickness: *thickness })
             }
             Self::Sheets { stack, sheets, transfer, light } => {
                 Content::Sheets(stack.content(sheets, transfer, *light))

@@ -23,8 +23,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use volery_frame::{Counted, Light, Quantization, Revision, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{Counted, Light, Revision, Sheet, SheetTransfer, SheetVertices, Sheets};
 use volery_reference::GridTracer;
+use volery_scene::mesh::AMBIENT;
 use volery_scene::{Camera, Projection, Samples};
 use volery_slicing::{MeshSheet, QuantizedMesh, SliceMesh, error};
 
@@ -38,9 +39,6 @@ use crate::transfer::Preset;
 use crate::view::{Dial, How, StackView, Transfer, View, ViewOptions};
 
 use stacks::Stacks;
-
-/// Of the light of matter without a gradient toward the viewer.
-const AMBIENT: f32 = 0.25;
 
 /// Why cells could not be sliced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -234,7 +232,7 @@ fn plan(stack: &Arc<Stack>, drawn: &mut Drawn, view: &View, range: [f64; 2]) -> 
         sheets: stack.sheets(&view.camera),
         stack: stack.clone(),
         transfer,
-        light: is_lit(view).then(|| Light::along_view(&view.camera, AMBIENT)),
+        light: is_lit(view).then(|| Light::along_view(&view.camera, AMBIENT as f32)),
     };
     Plan { drawing, store: None, work, bound_max: None, geometry_seconds: None }
 }
@@ -348,10 +346,9 @@ impl Stack {
 }
 
 fn quantized_vertices(mesh: &QuantizedMesh) -> SheetVertices<'_> {
-    let volery_slicing::Quantization { low, scale, magnitude_scale } = mesh.quantization;
     SheetVertices::Quantized {
         points: &mesh.points,
         gradients: &mesh.gradients,
-        quantization: Quantization { low, scale, magnitude_scale },
+        quantization: mesh.quantization,
     }
 }

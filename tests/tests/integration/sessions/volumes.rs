@@ -191,7 +191,7 @@ struct Narrow {
 
 impl Backend for Narrow {
     fn device(&self) -> Device {
-        Device { kind: DeviceKind::Software, name: "narrow".to_owned() }
+        Device { kind: DeviceKind::Software, name: "narrow".to_owned(), in_place_of: None }
     }
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {
