@@ -234,6 +234,7 @@ mod tests {
             include_str!("views.rs"),
             include_str!("sampling.rs"),
             include_str!("levels.rs"),
+            include_str!("seams.rs"),
             include_str!("compositing.rs"),
             include_str!("order.rs"),
             include_str!("requests.rs"),
