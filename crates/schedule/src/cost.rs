@@ -7,14 +7,19 @@
 //! `pace * (fixed + per_work * work * factor[item] + per_byte * bytes)`
 //!
 //! `factor` is the item's own, since the cost of a unit of work differs among items (empty space, cache), and is
-//! remembered between frames. `pace` follows a device that is busy or clocked down. All are learned the same way: with
-//! `r` = actual / predicted, each coefficient is multiplied by `r^(gain * part)`, where `part` is its part of the
-//! prediction. So coefficients stay positive, units do not matter, and what cannot be seen is not changed.
+//! remembered between frames. `pace` is the level of all costs: it follows a device that is busy or clocked down. With
+//! `r` = actual / predicted,
+//! - each factor is multiplied by `r^(gain * part)`, where `part` is the work's part of the prediction;
+//! - `pace` is multiplied by `r^gain`; the gain is small where errors look like noise, and grows where the last ones
+//!   all point one way;
+//! - `fixed` and `per_work` are shared out anew once a frame, by least squares of predicted / actual over the last few
+//!   hundred parts; the mean of predictions stays, so that this and `pace` do not work against each other;
+//! - `per_byte` follows actual less what is predicted for the work, since uploads are rare and may be short.
 //!
 //! # Robustness
 //! ln r is limited to +-0.5, so a part that took five times as long moves a prediction no more than one that took 1.65
-//! times as long. Five parts in a row that are off by more than half in the same direction are no spikes: the
-//! coefficients take it over at once. (With 5 % of spikes that is wrong once in 3 million parts, and put right five parts
+//! times as long. Five parts in a row that are off by more than half in the same direction are no spikes: `pace`
+//! takes it over at once. (With 5 % of spikes that is wrong once in 3 million parts, and put right five parts
 //! later.)
 //!
 //! So a prediction is of the usual cost, near the median. The mean is [`CostModel::expected_secs`]; margins are
@@ -25,22 +30,39 @@
 
 use std::collections::BTreeMap;
 
+use crate::balance::Balance;
 use crate::errors::ErrorRecord;
 use crate::item::{amount, secs as sane_secs};
 
 const LOG_LIMIT: f64 = 0.5;
-const PACE_GAIN: f64 = 0.03;
-const COEFFICIENT_GAIN: f64 = 0.02;
+/// How fast the pace follows where errors look like noise, and where they all point one way.
+const PACE_GAINS: [f64; 2] = [0.005, 0.1];
+/// The mean of the last errors at which the pace begins to hurry, and at which it does so fully.
+const TRENDS: [f64; 2] = [0.1, 0.3];
+const TREND_GAIN: f64 = 0.1;
+const MIN_UPLOAD_GAIN: f64 = 0.02;
 const MIN_FACTOR_GAIN: f64 = 0.08;
 /// Parts in a row that say that the device's speed is another, and by how much each must.
 const NUM_IN_A_ROW: usize = 5;
 const JUMP_RATIO: f64 = 1.5;
+/// Errors made before so many parts were seen say nothing of later ones.
+const NUM_TO_LEARN: u64 = 64;
 const FRAMES_KEPT: u64 = 1000;
 const MAX_PREDICTION_SECS: f64 = 1e9;
 /// 10 GB/s, until an upload was seen.
 const FIRST_SECS_PER_BYTE: f64 = 1e-10;
 /// Of the first part ever.
 const FIRST_FIXED_PART: f64 = 0.1;
+
+/// A coefficient that stays a positive number.
+fn limited(number: f64) -> f64 {
+    number.clamp(1e-18, 1e12)
+}
+
+/// Fixed cost and work as features: 1, and work times the item's factor.
+fn work_terms(terms: [f64; 3], secs_per_work: f64) -> [f64; 2] {
+    [1.0, terms[1] / secs_per_work]
+}
 
 #[derive(Clone, Copy, Debug)]
 struct Factor {
@@ -58,8 +80,12 @@ pub struct CostModel {
     pace: f64,
     factors: BTreeMap<u64, Factor>,
     recent_logs: Vec<f64>,
+    balance: Balance,
+    /// Mean of the last logarithms of errors.
+    trend: f64,
     errors: ErrorRecord,
     num_observed: u64,
+    num_uploads: u64,
     num_jumps: u64,
     frame: u64,
 }
@@ -73,8 +99,11 @@ impl Default for CostModel {
             pace: 1.0,
             factors: BTreeMap::new(),
             recent_logs: Vec::with_capacity(NUM_IN_A_ROW),
+            balance: Balance::default(),
+            trend: 0.0,
             errors: ErrorRecord::default(),
             num_observed: 0,
+            num_uploads: 0,
             num_jumps: 0,
             frame: 0,
         }
@@ -116,6 +145,7 @@ impl CostModel {
     pub fn begin_frame(&mut self) {
         self.frame += 1;
         self.errors.refresh();
+        self.rebalance();
         if self.frame.is_multiple_of(FRAMES_KEPT) {
             let frame = self.frame;
             self.factors.retain(|_, factor| factor.last_frame + FRAMES_KEPT > frame);
@@ -172,29 +202,47 @@ impl CostModel {
             self.errors.push(predicted_secs, secs);
         }
         self.num_observed += 1;
-        if self.num_observed <= 64 && self.num_observed.is_power_of_two() {
-            self.errors.refresh();
+        if self.num_observed == NUM_TO_LEARN {
+            self.errors.forget();
         }
-        let terms = self.terms(self.factor(key), work, bytes);
+        if self.num_observed < NUM_TO_LEARN && self.num_observed.is_power_of_two() {
+            self.errors.refresh();
+            self.rebalance();
+        }
+        let mut terms = self.terms(self.factor(key), work, bytes);
+        if terms[2] > 0.0 {
+            self.learn_upload(terms, secs);
+            terms = self.terms(self.factor(key), work, bytes);
+        }
         let predicted = self.pace * terms.iter().sum::<f64>();
         // A clock too coarse to see the part says only that it was short.
         let log = (secs.max(predicted / 100.0) / predicted).ln();
         if !log.is_finite() {
             return;
         }
-        let parts = terms.map(|term| term * self.pace / predicted);
+        let [_, work_part, upload_part] = terms.map(|term| term * self.pace / predicted);
+        self.balance.push(work_terms(terms, self.secs_per_work), secs - self.pace * terms[2]);
         if let Some(jump) = self.follow_jump(log) {
-            self.adjust(parts, jump);
+            self.pace = limited(self.pace * jump.exp());
             self.num_jumps += 1;
+            self.trend = 0.0;
             return;
         }
-        let log = log.clamp(-LOG_LIMIT, LOG_LIMIT);
-        self.pace = (self.pace * (PACE_GAIN * log).exp()).clamp(1e-12, 1e12);
-        self.adjust(parts, COEFFICIENT_GAIN * log);
-        let work_part = parts[1];
+        // An upload says little of the work.
+        let log = log.clamp(-LOG_LIMIT, LOG_LIMIT) * (1.0 - upload_part);
+        self.trend += TREND_GAIN * (log - self.trend);
+        let haste = ((self.trend.abs() - TRENDS[0]) / (TRENDS[1] - TRENDS[0])).clamp(0.0, 1.0);
+        let gain = PACE_GAINS[0] + haste * (PACE_GAINS[1] - PACE_GAINS[0]);
+        let gain = gain.max(4.0 / (self.num_observed + 10) as f64);
+        self.pace = limited(self.pace * (gain * log).exp());
+        if self.num_observed >= NUM_TO_LEARN {
+            self.learn_factor(key, work_part, log);
+        }
+    }
+
+    fn learn_factor(&mut self, key: u64, work_part: f64, log: f64) {
         let frame = self.frame;
-        let factor =
-            self.factors.entry(key).or_insert(Factor { ratio: 1.0, num_seen: 0, last_frame: frame });
+        let factor = self.factors.entry(key).or_insert(Factor { ratio: 1.0, num_seen: 0, last_frame: frame });
         let gain = MIN_FACTOR_GAIN.max(0.6 / f64::from(factor.num_seen + 1));
         factor.ratio = (factor.ratio * (gain * work_part * log).exp()).clamp(1e-3, 1e3);
         factor.num_seen = (factor.num_seen + 1).min(1000);
@@ -209,13 +257,23 @@ impl CostModel {
         self.secs_per_work = rest * (1.0 - FIRST_FIXED_PART) / if work > 0.0 { work } else { 1.0 };
     }
 
-    /// Multiplies each coefficient by `e^(step * its part)`.
-    fn adjust(&mut self, parts: [f64; 3], step: f64) {
-        let [fixed, work, upload] = parts;
-        let adjusted = |number: f64, part: f64| (number * (step * part).exp()).clamp(1e-18, 1e6);
-        self.fixed_secs = adjusted(self.fixed_secs, fixed);
-        self.secs_per_work = adjusted(self.secs_per_work, work);
-        self.secs_per_byte = adjusted(self.secs_per_byte, upload);
+    /// Takes what the part took beyond its work for the upload. The logarithm is limited, so it is the median that is
+    /// found, however little of the part the upload was.
+    fn learn_upload(&mut self, terms: [f64; 3], secs: f64) {
+        let rest = secs / self.pace - terms[0] - terms[1];
+        let limit = LOG_LIMIT * (1.0 + 8.0 / (self.num_uploads + 1) as f64);
+        let log = (rest.max(1e-30) / terms[2]).ln().clamp(-limit, limit);
+        let gain = MIN_UPLOAD_GAIN.max(0.6 / (self.num_uploads + 1) as f64);
+        self.secs_per_byte = (self.secs_per_byte * (gain * log).exp()).clamp(1e-18, 1e6);
+        self.num_uploads += 1;
+    }
+
+    /// Shares costs out anew between fixed cost and work; what is predicted in the mean stays.
+    fn rebalance(&mut self) {
+        if let Some([fixed_secs, secs_per_work]) = self.balance.solve([self.fixed_secs, self.secs_per_work]) {
+            self.fixed_secs = limited(fixed_secs);
+            self.secs_per_work = limited(secs_per_work);
+        }
     }
 
     /// Several parts in a row agree that costs are others: how much of the logarithm is to be taken over at once.

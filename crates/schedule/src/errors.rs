@@ -1,6 +1,7 @@
 //! How far predictions were off: the last 512 ratios of actual to predicted seconds, their mean, spread and quantiles.
 //!
-//! The mean is above 1 where parts stall at times, since a prediction is of the usual cost. A margin is a quantile: what
+//! The mean is of sums, so long parts count more. It is above 1 where parts stall at times, since a prediction is of the
+//! usual cost. A margin is a quantile: what
 //! it covers is what was seen, whatever the distribution. Until 32 parts are known, quantiles above the median are at
 //! least 3. Reading costs nothing; [`ErrorRecord::refresh`] sorts, once a frame.
 
@@ -12,7 +13,8 @@ const NUM_TRUSTED: usize = 32;
 /// Ratios of actual to predicted seconds of the parts seen last.
 #[derive(Clone, Debug, Default)]
 pub struct ErrorRecord {
-    ratios: Vec<f64>,
+    /// With the prediction, which is the weight.
+    ratios: Vec<(f64, f64)>,
     oldest: usize,
     sorted: Vec<f64>,
     mean: f64,
@@ -27,21 +29,30 @@ impl ErrorRecord {
         }
         let ratio = (secs / predicted_secs).min(MAX_RATIO);
         if self.ratios.len() < CAPACITY {
-            self.ratios.push(ratio);
+            self.ratios.push((ratio, predicted_secs));
         } else {
-            self.ratios[self.oldest] = ratio;
+            self.ratios[self.oldest] = (ratio, predicted_secs);
             self.oldest = (self.oldest + 1) % CAPACITY;
         }
     }
 
+    /// Forgets all ratios; mean, spread and quantiles stay until they are brought up to date.
+    pub(crate) fn forget(&mut self) {
+        self.ratios.clear();
+        self.oldest = 0;
+    }
+
     /// Brings mean, spread and quantiles up to date.
     pub fn refresh(&mut self) {
-        self.sorted.clone_from(&self.ratios);
+        self.sorted.clear();
+        self.sorted.extend(self.ratios.iter().map(|(ratio, _)| ratio));
         self.sorted.sort_by(f64::total_cmp);
-        let num = self.ratios.len().max(1) as f64;
-        self.mean = self.sorted.iter().sum::<f64>() / num;
-        let squares: f64 = self.sorted.iter().map(|ratio| (ratio - self.mean).powi(2)).sum();
-        self.deviation = (squares / num).sqrt();
+        let weights: f64 = self.ratios.iter().map(|(_, weight)| weight).sum();
+        let mean = |of: &dyn Fn(f64) -> f64| {
+            self.ratios.iter().map(|(ratio, weight)| of(*ratio) * weight).sum::<f64>() / weights.max(1e-300)
+        };
+        self.mean = mean(&|ratio| ratio);
+        self.deviation = mean(&|ratio| (ratio - self.mean).powi(2)).sqrt();
     }
 
     /// Parts known.
@@ -85,8 +96,8 @@ mod tests {
     #[test]
     fn quantiles_are_those_of_what_was_seen_last() {
         let mut record = ErrorRecord::default();
-        for index in 0..2000_u32 {
-            record.push(2.0, 2.0 * f64::from(index % 100 + 1) / 50.0);
+        for index in 0..2048_u32 {
+            record.push(2.0, 2.0 * f64::from(index % 128 + 1) / 64.0);
         }
         record.push(f64::NAN, 1.0);
         record.push(0.0, 1.0);

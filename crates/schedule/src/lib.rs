@@ -9,6 +9,7 @@
 //! - [`controllers`]: what else is in use, to compare with.
 //! - [`simulate`]: a device of numbers, to compare on.
 
+mod balance;
 pub mod controllers;
 pub mod cost;
 pub mod errors;

@@ -146,9 +146,8 @@ impl Table {
 
     /// Items made finer while the limit holds, those that gain most per second first.
     pub(crate) fn refine(&self, limit: &Limit, levels: &mut [usize]) {
-        let cost = |levels: &[usize], item: usize| {
-            self.levels_of(item).get(levels[item]).copied().unwrap_or(0.0)
-        };
+        let cost =
+            |levels: &[usize], item: usize| self.levels_of(item).get(levels[item]).copied().unwrap_or(0.0);
         let mut sum: f64 = (0..self.len()).map(|item| cost(levels, item)).sum();
         let mut squares: f64 = (0..self.len()).map(|item| cost(levels, item).powi(2)).sum();
         let mut heap: BinaryHeap<Candidate> =

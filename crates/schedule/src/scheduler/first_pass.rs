@@ -2,8 +2,8 @@
 
 use crate::plan::nearest;
 
-use crate::item::Step;
 use super::Scheduler;
+use crate::item::Step;
 
 /// Standard deviations that the reserve for the coarsest levels has above its mean.
 const RESERVE_SIGMAS: f64 = 2.0;

@@ -133,7 +133,8 @@ impl Frame {
         for (item, slot) in self.slots.iter().enumerate() {
             let first = self.table.first(item);
             let range = first..first + self.table.num_levels(item);
-            let levels = self.work[range.clone()].iter().copied().zip(self.bytes[range.clone()].iter().copied());
+            let levels =
+                self.work[range.clone()].iter().copied().zip(self.bytes[range.clone()].iter().copied());
             for (secs, predicted) in
                 self.table.secs[range].iter_mut().zip(model.predict_levels(slot.key, levels))
             {

@@ -40,7 +40,8 @@ impl Outcome {
 
     /// Part of all time that went to each third of items by importance.
     pub fn class_shares(&self) -> [f64; 3] {
-        let secs = [0, 1, 2].map(|class| self.frames.iter().map(|frame| frame.class_secs[class]).sum::<f64>());
+        let secs =
+            [0, 1, 2].map(|class| self.frames.iter().map(|frame| frame.class_secs[class]).sum::<f64>());
         let all: f64 = secs.iter().sum();
         secs.map(|secs| if all > 0.0 { secs / all } else { 0.0 })
     }
@@ -72,11 +73,10 @@ impl Distribution {
         sorted.sort_by(f64::total_cmp);
         let num = all.len();
         let quantile = |part: f64| sorted[((part * num as f64).ceil() as usize).clamp(1, num) - 1];
-        let part =
-            |is_good: &dyn Fn(f64) -> bool| {
-                all.iter().filter(|(error, is_at_limit)| *is_at_limit || is_good(*error)).count() as f64
-                    / num as f64
-            };
+        let part = |is_good: &dyn Fn(f64) -> bool| {
+            all.iter().filter(|(error, is_at_limit)| *is_at_limit || is_good(*error)).count() as f64
+                / num as f64
+        };
         Distribution {
             num_frames: num,
             quantiles: [0.0, 0.01, 0.5, 0.95, 0.99, 1.0].map(quantile),
