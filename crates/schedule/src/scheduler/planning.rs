@@ -74,6 +74,19 @@ impl Scheduler {
                 levels[item] = ideal[item];
             }
         } else if sum < limit.budget_secs * (1.0 - DEAD_BAND) {
+            // Those that gain most for each second go to the paper's level first.
+            let mut heap: BinaryHeap<_> = (0..table.len())
+                .filter(|&item| levels[item] > ideal[item])
+                .filter_map(|item| table.candidate(item, levels[item]))
+                .collect();
+            while let Some(candidate) = heap.pop() {
+                let Reverse(item) = candidate.item;
+                let more_secs = cost(item, ideal[item]) - cost(item, levels[item]);
+                if sum + more_secs <= limit.budget_secs {
+                    sum += more_secs;
+                    levels[item] = ideal[item];
+                }
+            }
             table.refine(&limit, levels);
         }
     }
