@@ -5,6 +5,7 @@ mod certify;
 mod drag;
 mod field;
 mod filters;
+mod seams;
 mod section;
 #[path = "../world/mod.rs"]
 mod world;
