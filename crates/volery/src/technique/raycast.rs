@@ -5,7 +5,7 @@
 //! function, a node is skipped; within the data tolerance it is drawn at its level; else its children are
 //! asked. The nodes left are put in exact visibility order and become the bricks of a frame. Skipped nodes
 //! cost nothing: they are neither read nor resident nor drawn. With a tolerance the cut is balanced and joined
-//! ([`volery_octree::seams`]): rays meet one continuous field.
+//! ([`seams`](mod@volery_octree::seams)): rays meet one continuous field.
 //!
 //! # Guarantees
 //! - Without a tolerance, and with a tolerance of 0, every node drawn is of the finest level.
