@@ -34,7 +34,7 @@ impl<'a> Field<'a> {
         for corner in 0..8 {
             let near: [usize; 3] = std::array::from_fn(|axis| {
                 let at = at[axis];
-                if !is_seam || side[axis] != 1 || at % 2 == 0 {
+                if !is_seam || side[axis] != 1 || at.is_multiple_of(2) {
                     at
                 } else if corner >> axis & 1 == 0 {
                     at - 1
