@@ -346,5 +346,5 @@ fn the_demo_draws_every_technique_and_a_contact_sheet() {
     let pictures = std::fs::read_dir(shop.path("pictures")).unwrap().count();
     assert_eq!(pictures, 3 * 7 + 1);
     let sheet = volery::io::read_png_rgb(&shop.path("pictures/contact-sheet.png")).unwrap();
-    assert!(sheet.width > 7 * 248 && sheet.height > 3 * 248);
+    assert!(sheet.width > 7 * 228 && sheet.height > 3 * 228);
 }

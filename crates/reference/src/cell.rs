@@ -25,6 +25,14 @@ pub(crate) fn base(corners: &Corners, enter: DVec3, exit: DVec3) -> f64 {
     corners[is_upper(0) | is_upper(1) << 1 | is_upper(2) << 2]
 }
 
+/// The same for a transfer function that changes at some values, from which others are `beyond`: of corners as near to
+/// those the one next to the middle. Counted from an outlier, values that can be seen would have no digits.
+pub(crate) fn base_near(corners: &Corners, enter: DVec3, exit: DVec3, beyond: impl Fn(f64) -> f64) -> f64 {
+    let middle = base(corners, enter, exit);
+    let nearest = |near: f64, &corner: &f64| if beyond(corner) < beyond(near) { corner } else { near };
+    corners.iter().fold(middle, nearest)
+}
+
 /// `a` at 0, `b` at 1, exactly; never beyond them by more than rounding, and it cannot overflow.
 fn mix(a: f64, b: f64, w: f64) -> f64 {
     a * (1.0 - w) + b * w

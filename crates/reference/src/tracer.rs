@@ -237,13 +237,17 @@ impl<'a> Tracer<'a> {
             return;
         }
         let base = DVec3::from_array(cell.map(|c| c as f64));
-        let local = |t: f64| (way.at(t) - base).clamp(DVec3::ZERO, DVec3::ONE);
+        // Places are known to a hair, and beside an outlier the field a hair from a face is nothing like that on it.
+        let on_faces = |place: DVec3| {
+            DVec3::select((place - place.round()).abs().cmple(DVec3::splat(SLIVER)), place.round(), place)
+        };
+        let local = |t: f64| on_faces((way.at(t) - base).clamp(DVec3::ZERO, DVec3::ONE));
         let length = (t[1] - t[0]) / self.bands.unit_distance();
         if low == high {
             return add_constant(light, &self.bands.at(0.0, low), length);
         }
         let [enter, exit] = t.map(local);
-        let base = cell::base(&corners, enter, exit);
+        let base = cell::base_near(&corners, enter, exit, |value| self.bands.beyond_edges(value));
         let field = cell::along(&corners, base, enter, exit);
         let is_sliver = (exit - enter).abs().max_element() <= SLIVER;
         let integrator = Integrator { bands: &self.bands, tolerance: self.tolerance, is_sliver };

@@ -131,6 +131,11 @@ impl Bands {
         self.unit_distance
     }
 
+    /// How far a value is from those between the first edge and the last.
+    pub(crate) fn beyond_edges(&self, value: f64) -> f64 {
+        (self.edges[0] - value).max(value - self.edges[self.edges.len() - 1]).max(0.0)
+    }
+
     /// How far the edge between bands `index` and `index + 1` is above a base.
     pub(crate) fn edge(&self, index: usize, base: f64) -> f64 {
         self.edges[index] - base

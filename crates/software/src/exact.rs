@@ -44,7 +44,7 @@ const MIN_TINT: f32 = 1e-3;
 pub(crate) const EXACT_DOUBT: f32 = 0.0025;
 
 /// How exactly a place in a cell is known, in cells: what a field is off by, as a share of the range of the corners.
-const PLACE_ROUNDING: f32 = 1e-5;
+pub(crate) const PLACE_ROUNDING: f32 = 1e-5;
 
 /// Of an extinction without end.
 const OPAQUE: f32 = 1e30;

@@ -14,7 +14,7 @@ use fearless_simd::{f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 use crate::MIN_TRANSMITTANCE;
 use crate::brick::Occupancy;
 use crate::cell::{Cell, balanced, mean_distance};
-use crate::exact::{Bands, EXACT_DOUBT, Field, add_cells};
+use crate::exact::{Bands, EXACT_DOUBT, Field, PLACE_ROUNDING, add_cells};
 use crate::math::{axes, four, front_weight, opacity_of_depth, transpose};
 use crate::packet::Span;
 use crate::seams::{Seams, join};
@@ -375,6 +375,36 @@ impl<'a, S: Simd> Walker<'a, S> {
         (x * half) * (y * half) * (z * half) * 8.0
     }
 
+    /// The texels at both ends of a cell. Beside an outlier the field a hair from a face is nothing like that on it, and
+    /// places are known to a hair: the ends count as on the face, as they do for the cell on its other side.
+    #[inline(always)]
+    fn beside_outliers(
+        &self,
+        simd: S,
+        (cell, huge): (&Cell<S>, f32),
+        [exact, fresh]: [mask32x16<S>; 2],
+        [first, last]: [f32x16<S>; 2],
+        end: f32x16<S>,
+    ) -> [f32x16<S>; 2] {
+        let [least, greatest] = cell.range();
+        let lanes = exact & (greatest - least).simd_gt(huge);
+        if lanes.all_false() {
+            return [first, last];
+        }
+        let value = |depth: f32x16<S>| {
+            let fraction = self.fraction(simd, depth);
+            cell.value(axes(
+                #[inline(always)]
+                |axis| {
+                    let at = fraction[axis];
+                    let is_near = (at - at.round_ties_even()).abs().simd_le(PLACE_ROUNDING);
+                    is_near.select(at.round_ties_even(), at)
+                },
+            ))
+        };
+        [(lanes & fresh).select(value(self.depth), first), lanes.select(value(end), last)]
+    }
+
     /// Position in the cell at `depth`, in [0, 1] along each axis.
     #[inline(always)]
     fn fraction(&self, simd: S, depth: f32x16<S>) -> [f32x16<S>; 3] {
@@ -524,6 +554,10 @@ pub(crate) fn walk<S: Simd, T: Texel>(
         let mut exact = mask32x16::splat(simd, false);
         if let Some(blocks) = matter.exact {
             exact = lanes & walker.in_block(simd, blocks);
+        }
+        if exact.any_true() {
+            [first, last] =
+                walker.beside_outliers(simd, (&cell, table.bands.huge), [exact, fresh], [first, last], end);
         }
         let stretch = Stretch { end, half, values: [first, middle, last] };
         from = add_cell(simd, table, (&walker, &cell, &stretch), from, [lanes, exact], light);

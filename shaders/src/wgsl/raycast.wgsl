@@ -418,10 +418,25 @@ struct Stretch {
 }
 
 // The stretch between two places of a ray that starts at `origin` and goes by `step`, whose first texel is known.
-fn stretch_of(corners: Corners, first: f32, origin: vec3f, places: vec2f, step: vec3f) -> Stretch {
+fn stretch_of(corners: Corners, first: f32, origin: vec3f, places: vec2f, step: vec3f, is_hard: bool) -> Stretch {
     let middle = texel_at(corners, origin + 0.5 * (places.x + places.y) * step);
-    let last = texel_at(corners, origin + places.y * step);
+    let end = origin + places.y * step;
+    var last = texel_at(corners, end);
+    if HAS_EXACT && is_hard {
+        last = texel_beside_outlier(corners, end, last);
+    }
     return Stretch(middle, last, balanced(first, middle, last));
+}
+
+// Beside an outlier the field a hair from a face is nothing like that on it, and places are known to a hair: the end of a
+// cell counts as on the face, as it does for the cell on its other side.
+fn texel_beside_outlier(corners: Corners, place: vec3f, texel: f32) -> f32 {
+    let range = range_of(corners);
+    if !(range.y - range.x > frame.huge_range) {
+        return texel;
+    }
+    let hair = max(PLACE_ROUNDING, 2.4e-7 * largest(frame.cells));
+    return texel_at(corners, select(place, round(place), abs(place - round(place)) <= vec3f(hair)));
 }
 
 // The finest cell that a ray is in from `t` on, in a box that it leaves at `faces` or beside it.
@@ -475,16 +490,17 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let t_far = select(min(exit, t + reach), t, is_start);
         let origin = ray.start - low;
         let light_behind = select(0.0, light.transmittance, is_matter && !is_start);
-        let is_exact = HAS_EXACT && light_behind > 0.0 && (words.y & EXACT) != 0u;
+        let is_hard = (words.y & EXACT) != 0u;
+        let is_exact = HAS_EXACT && light_behind > 0.0 && is_hard;
         let step = ray.direction * inverse_scale;
-        var stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_far), step);
+        var stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_far), step, is_hard);
         let distance = mean_distance(end.texel, stretch.middle, stretch.last, stretch.over);
         let way = (t_far - t) * inverse_scale * ray.motion;
         var doubt = doubt_of_field(corners, distance, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
         var t_next = t_far;
         if doubt > MAX_DOUBT && !is_exact {
             t_next = min(t + max(good_share(doubt) * (t_far - t), MIN_STRETCH * scale), t_far);
-            stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_next), step);
+            stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_next), step, is_hard);
             doubt = min(doubt, MAX_DOUBT);
         }
         let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);
