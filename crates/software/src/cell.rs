@@ -1,6 +1,6 @@
 //! The field in one cell per lane: trilinear between its corners, along a ray a cubic, mostly nearly a parabola.
 
-use fearless_simd::{f32x16, prelude::*};
+use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use crate::math::{axes, four};
 
@@ -77,6 +77,13 @@ impl<S: Simd> Cell<S> {
             |i| [self.low[i].min(high[i]), self.low[i].max(high[i])],
         );
         [a[0].min(b[0]).min(c[0].min(d[0])), a[1].max(b[1]).max(c[1].max(d[1]))]
+    }
+
+    /// Whether corners differ by more texels.
+    #[inline(always)]
+    pub(crate) fn is_wider_than(&self, texels: f32) -> mask32x16<S> {
+        let [least, greatest] = self.range();
+        (greatest - least).simd_gt(texels)
     }
 
     /// The part of the field that no parabola is: the coefficient of `x y z`.

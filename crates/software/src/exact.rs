@@ -70,6 +70,8 @@ pub(crate) struct Bands<'a> {
     pub(crate) depth_scale: f32,
     /// Cells of a larger range, in texels, lie beside an outlier.
     pub(crate) huge: f32,
+    /// How far from a step the texel of a constant cell may have been rounded across it.
+    pub(crate) flat_rounding: f32,
 }
 
 /// A band per lane.
@@ -239,7 +241,7 @@ struct Course<S: Simd> {
     /// Of the corners, and the texel at the end of the cell, from the origin of texels.
     range: [f32x16<S>; 2],
     last: f32x16<S>,
-    /// What the field may be off by; 0 where it is constant.
+    /// What the field may be off by.
     rounding: f32x16<S>,
     is_huge: mask32x16<S>,
     band: i32x16<S>,
@@ -285,8 +287,9 @@ impl<S: Simd> Course<S> {
         let steepest = cubic[1].abs() + cubic[2].abs() * 2.0 + cubic[3].abs() * 3.0;
         let reach = range[1] - range[0];
         let digits = range[0].abs().max(range[1].abs()) * f32::EPSILON;
+        let flat = f32x16::splat(simd, bands.flat_rounding);
         let rounding =
-            reach.simd_gt(zero).select(reach.mul_add(f32x16::splat(simd, PLACE_ROUNDING), digits), zero);
+            reach.simd_gt(zero).select(reach.mul_add(f32x16::splat(simd, PLACE_ROUNDING), digits), flat);
         let turns = turns(simd, &cubic);
         let band = bands.find(simd, cubic[0]);
         let row = bands.rows(simd, band);
@@ -356,7 +359,7 @@ impl<S: Simd> Course<S> {
         let width = reach(simd, &self.cubic, self.span, [u_end, target], crosses | is_cut);
         // Beside an outlier bands are passed in less than rounding. Yet not in nothing.
         let least = (target - u).abs() / self.steepest;
-        let width = (crosses & self.is_huge & least.simd_le(1.0)).select(width.max(least), width);
+        let width = (self.is_huge & !is_cut & least.simd_le(1.0)).select(width.max(least), width);
         self.shallow(simd, Interval { width, target, crosses, is_cut })
     }
 

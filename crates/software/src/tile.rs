@@ -76,6 +76,7 @@ pub(crate) fn draw<T: Texel>(
             bands: transfer.bands(),
             depth_scale: transfer.depth_scale() as f32,
             huge: transfer.huge_range() as f32,
+            flat_rounding: transfer.flat_rounding() as f32,
         },
     };
     let rays = target.view.camera.rays(target.view.width, target.view.height);

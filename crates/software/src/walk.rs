@@ -312,6 +312,20 @@ impl<'a, S: Simd> Walker<'a, S> {
         ((byte >> bit) & 1).simd_ne(0) & self.active
     }
 
+    /// Takes lanes to where they stand in blocks with matter, and returns those that moved.
+    #[inline(always)]
+    fn leap_empty(&mut self, simd: S, occupancy: &Occupancy) -> mask32x16<S> {
+        let mut moved = mask32x16::splat(simd, false);
+        loop {
+            let empty = self.active & !self.in_block(simd, occupancy);
+            if empty.all_false() {
+                return moved;
+            }
+            self.leap(simd, empty);
+            moved |= empty;
+        }
+    }
+
     /// Takes `lanes` to where they leave their block.
     #[inline(always)]
     fn leap(&mut self, simd: S, lanes: mask32x16<S>) {
@@ -375,34 +389,49 @@ impl<'a, S: Simd> Walker<'a, S> {
         (x * half) * (y * half) * (z * half) * 8.0
     }
 
-    /// The texels at both ends of a cell. Beside an outlier the field a hair from a face is nothing like that on it, and
-    /// places are known to a hair: the ends count as on the face, as they do for the cell on its other side.
+    /// The texels at both ends of cells with these corners, anew where they lie beside an outlier.
     #[inline(always)]
     fn beside_outliers(
         &self,
         simd: S,
-        (cell, huge): (&Cell<S>, f32),
-        [exact, fresh]: [mask32x16<S>; 2],
+        (corners, texel_origin): (impl FnOnce() -> [f32x16<S>; 8], f32),
+        [lanes, fresh]: [mask32x16<S>; 2],
         [first, last]: [f32x16<S>; 2],
         end: f32x16<S>,
     ) -> [f32x16<S>; 2] {
-        let [least, greatest] = cell.range();
-        let lanes = exact & (greatest - least).simd_gt(huge);
         if lanes.all_false() {
             return [first, last];
         }
-        let value = |depth: f32x16<S>| {
-            let fraction = self.fraction(simd, depth);
-            cell.value(axes(
-                #[inline(always)]
-                |axis| {
-                    let at = fraction[axis];
-                    let is_near = (at - at.round_ties_even()).abs().simd_le(PLACE_ROUNDING);
-                    is_near.select(at.round_ties_even(), at)
-                },
-            ))
-        };
-        [(lanes & fresh).select(value(self.depth), first), lanes.select(value(end), last)]
+        let corners = corners();
+        let field = (&corners, texel_origin);
+        let first = (lanes & fresh).select(self.on_faces(simd, field, self.depth), first);
+        [first, lanes.select(self.on_faces(simd, field, end), last)]
+    }
+
+    /// The texel of a cell with these corners at `depth`. Beside an outlier the field a hair from a face is nothing like
+    /// that on it, and places are known to a hair: those near a face count as on it, as they do for the cell on its
+    /// other side, and corners without weight count for nothing.
+    #[inline(always)]
+    fn on_faces(
+        &self,
+        simd: S,
+        (corners, texel_origin): (&[f32x16<S>; 8], f32),
+        depth: f32x16<S>,
+    ) -> f32x16<S> {
+        let place = self.fraction(simd, depth);
+        let [x, y, z] = axes(
+            #[inline(always)]
+            |axis| {
+                let nearest = place[axis].round_ties_even();
+                (place[axis] - nearest).abs().simd_le(PLACE_ROUNDING).select(nearest, place[axis])
+            },
+        );
+        let mix = |a: f32x16<S>, b: f32x16<S>, w: f32x16<S>| a * (1.0 - w) + b * w;
+        let lines = four(
+            #[inline(always)]
+            |i| mix(corners[2 * i] - texel_origin, corners[2 * i + 1] - texel_origin, x),
+        );
+        mix(mix(lines[0], lines[1], y), mix(lines[2], lines[3], y), z)
     }
 
     /// Position in the cell at `depth`, in [0, 1] along each axis.
@@ -510,14 +539,7 @@ pub(crate) fn walk<S: Simd, T: Texel>(
     let mut from = table.at(simd, zero);
     let mut first = zero;
     loop {
-        loop {
-            let empty = walker.active & !walker.in_block(simd, matter.occupancy);
-            if empty.all_false() {
-                break;
-            }
-            walker.leap(simd, empty);
-            fresh |= empty;
-        }
+        fresh |= walker.leap_empty(simd, matter.occupancy);
         if walker.active.all_false() {
             return;
         }
@@ -556,8 +578,11 @@ pub(crate) fn walk<S: Simd, T: Texel>(
             exact = lanes & walker.in_block(simd, blocks);
         }
         if exact.any_true() {
+            // Once more: what the cell keeps of them has no digits of those beside an outlier.
+            let corners = || matter.joined(simd, &walker, T::corners(simd, rows, address));
+            let lanes = [exact & cell.is_wider_than(table.bands.huge), fresh];
             [first, last] =
-                walker.beside_outliers(simd, (&cell, table.bands.huge), [exact, fresh], [first, last], end);
+                walker.beside_outliers(simd, (corners, table.texel_origin), lanes, [first, last], end);
         }
         let stretch = Stretch { end, half, values: [first, middle, last] };
         from = add_cell(simd, table, (&walker, &cell, &stretch), from, [lanes, exact], light);

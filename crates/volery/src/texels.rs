@@ -15,7 +15,7 @@
 
 use volery_frame::{TexelType, Texels};
 use volery_pyramid::{BrickSamples, for_brick_samples};
-use volery_scene::{Sample, SampleType, TransferFunction};
+use volery_scene::{ControlPoint, Sample, SampleType, TransferFunction};
 
 /// The farthest that a finite sample is from the window, in windows.
 const FARTHEST: f64 = 1e12;
@@ -61,6 +61,33 @@ impl Encoding {
         let window = self.over([low, high]);
         let step = window.scale / 4.0;
         Self { offset: (low / step).floor() * step, ..window }
+    }
+
+    /// Whether samples of a type on either side of a step of a transfer function may have one texel.
+    pub(crate) fn blurs(&self, transfer: &TransferFunction, sample_type: SampleType) -> bool {
+        let is_step = |pair: &&[ControlPoint]| {
+            pair[0].value == pair[1].value
+                && (pair[0].opacity, pair[0].color) != (pair[1].opacity, pair[1].color)
+        };
+        let blurs = |value: f64| {
+            let texel = ((value - self.offset) / self.scale) as f32;
+            let rounding = f64::from(texel.abs().next_up() - texel.abs()) * self.scale;
+            // From the step to the nearest sample beside it.
+            let held = match sample_type {
+                SampleType::F64 => return true,
+                SampleType::F32 => f64::from(value as f32),
+                _ => value.round(),
+            };
+            let step = if sample_type == SampleType::F32 {
+                f64::from((value as f32).abs().next_up() - (value as f32).abs())
+            } else {
+                1.0
+            };
+            let gap = if held == value { step } else { (held - value).abs() };
+            gap < rounding
+        };
+        let mut steps = transfer.points().windows(2).filter(is_step).map(|pair| pair[0].value);
+        self.texel == TexelType::F32 && steps.any(blurs)
     }
 
     /// Texels from 0 to at most 1 over a window. In units of a power of two, and from a whole number where the window is

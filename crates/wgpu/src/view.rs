@@ -86,6 +86,7 @@ pub(crate) fn shader_frame(
         depth_scale: transfer.depth_scale() as f32,
         num_bands: transfer.bands().len() as u32,
         huge_range: transfer.huge_range() as f32,
+        flat_rounding: transfer.flat_rounding() as f32,
         surface_offset: (picture.surfaces.zero_depth() - start_depth) as f32,
         cells_per_depth: (longest / spacing) as f32,
         ..bytemuck::Zeroable::zeroed()

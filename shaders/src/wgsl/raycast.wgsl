@@ -58,6 +58,8 @@ struct Frame {
     num_bands: u32,
     // Cells of a larger range, in texels, lie beside an outlier.
     huge_range: f32,
+    // How far from a step the texel of a constant cell may have been rounded across it.
+    flat_rounding: f32,
     // Of surfaces: what is added to their depth to count from the ray's start, and finest cells per depth for a
     // direction of length 1 as the frame has it.
     surface_offset: f32,
@@ -418,25 +420,33 @@ struct Stretch {
 }
 
 // The stretch between two places of a ray that starts at `origin` and goes by `step`, whose first texel is known.
-fn stretch_of(corners: Corners, first: f32, origin: vec3f, places: vec2f, step: vec3f, is_hard: bool) -> Stretch {
+fn stretch_of(corners: Corners, first: f32, origin: vec3f, places: vec2f, step: vec3f) -> Stretch {
     let middle = texel_at(corners, origin + 0.5 * (places.x + places.y) * step);
-    let end = origin + places.y * step;
-    var last = texel_at(corners, end);
-    if HAS_EXACT && is_hard {
-        last = texel_beside_outlier(corners, end, last);
-    }
+    let last = texel_at(corners, origin + places.y * step);
     return Stretch(middle, last, balanced(first, middle, last));
 }
 
-// Beside an outlier the field a hair from a face is nothing like that on it, and places are known to a hair: the end of a
-// cell counts as on the face, as it does for the cell on its other side.
-fn texel_beside_outlier(corners: Corners, place: vec3f, texel: f32) -> f32 {
+// The texel at a place of a cell of the brick that a unit's words name, if it lies beside an outlier: there the field a
+// hair from a face is nothing like that on it, and places are known to a hair. Those near a face count as on it, as they do
+// for the cell on its other side, and corners without weight count for nothing.
+fn texel_beside_outlier(corners: Corners, words: vec2u, cell: vec3f, place: vec3f, texel: f32) -> f32 {
     let range = range_of(corners);
-    if !(range.y - range.x > frame.huge_range) {
+    if !HAS_EXACT || words.x == 0u || !(range.y - range.x > frame.huge_range) {
         return texel;
     }
     let hair = max(PLACE_ROUNDING, 2.4e-7 * largest(frame.cells));
-    return texel_at(corners, select(place, round(place), abs(place - round(place)) <= vec3f(hair)));
+    let w = select(place, round(place), abs(place - round(place)) <= vec3f(hair));
+    let slot = slot_of(words.x);
+    var sum = 0.0;
+    for (var i = 0u; i < 8u; i++) {
+        let corner = vec3f(vec3u(i, i >> 1u, i >> 2u) & vec3u(1u));
+        let weights = mix(1.0 - w, w, corner);
+        let weight = weights.x * weights.y * weights.z;
+        if weight != 0.0 {
+            sum += weight * sample_at(slot, cell + corner);
+        }
+    }
+    return sum;
 }
 
 // The finest cell that a ray is in from `t` on, in a box that it leaves at `faces` or beside it.
@@ -478,11 +488,9 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let corners = joined_corners(texels_of(stored, is_matter), select(vec2u(0u), words, is_matter), cell);
 
         // The box that this round leaves.
-        let cells = select(1.0, frame.brick_cells, is_passed);
-        let low_cell = select(cell, vec3f(0.0), is_passed);
         let around = f32(words.x);
-        let low = select((unit + 1.0 - around) * frame.unit_cells, brick_low + low_cell * scale, is_occupied);
-        let high = low + select((2.0 * around - 1.0) * frame.unit_cells, cells * scale, is_occupied);
+        let low = select((unit + 1.0 - around) * frame.unit_cells, brick_low + select(cell, vec3f(0.0), is_passed) * scale, is_occupied);
+        let high = low + select((2.0 * around - 1.0) * frame.unit_cells, select(1.0, frame.brick_cells, is_passed) * scale, is_occupied);
         let faces = (mix(low, high, ray.rising) - ray.start) * ray.inverse;
         let exit = max(min(smallest(faces), t_end), t);
         // A round without length finds the value where a run of cells begins.
@@ -490,17 +498,19 @@ fn light_along(ray: Ray, before: vec4f) -> Light {
         let t_far = select(min(exit, t + reach), t, is_start);
         let origin = ray.start - low;
         let light_behind = select(0.0, light.transmittance, is_matter && !is_start);
-        let is_hard = (words.y & EXACT) != 0u;
-        let is_exact = HAS_EXACT && light_behind > 0.0 && is_hard;
+        let is_hard = HAS_EXACT && is_matter && (words.y & EXACT) != 0u;
+        let is_exact = is_hard && light_behind > 0.0;
         let step = ray.direction * inverse_scale;
-        var stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_far), step, is_hard);
+        var stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_far), step);
+        let hard_words = select(vec2u(0u), words, is_hard);
+        stretch.last = texel_beside_outlier(corners, hard_words, cell, origin * inverse_scale + t_far * step, stretch.last);
         let distance = mean_distance(end.texel, stretch.middle, stretch.last, stretch.over);
         let way = (t_far - t) * inverse_scale * ray.motion;
         var doubt = doubt_of_field(corners, distance, way) * 0.5 * (t_far - t) * ray.depth_per_t * light_behind;
         var t_next = t_far;
         if doubt > MAX_DOUBT && !is_exact {
             t_next = min(t + max(good_share(doubt) * (t_far - t), MIN_STRETCH * scale), t_far);
-            stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_next), step, is_hard);
+            stretch = stretch_of(corners, end.texel, origin * inverse_scale, vec2f(t, t_next), step);
             doubt = min(doubt, MAX_DOUBT);
         }
         let depth = select(0.0, 0.5 * (t_next - t) * ray.depth_per_t, is_matter);

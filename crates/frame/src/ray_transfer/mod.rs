@@ -103,6 +103,7 @@ pub struct RayTransfer {
     rounding: f64,
     unit_length: f64,
     depth_scale: f64,
+    flat_rounding: f64,
 }
 
 /// What is known of a bin.
@@ -222,7 +223,17 @@ impl RayTransfer {
             rounding,
             unit_length,
             depth_scale,
+            flat_rounding: 0.0,
         }
+    }
+
+    /// The same of texels that are rounded, so that one at a step of the transfer function may stand for a value on either
+    /// side of it: where a cell is constant there, it counts as touching the step.
+    #[must_use]
+    pub fn of_rounded_texels(self) -> Self {
+        let [from, to] = [&self.bands[0], &self.bands[self.bands.len() - 1]].map(|band| f64::from(band.base));
+        let most = [from, to].map(|base| (base + self.texel_origin).abs());
+        Self { flat_rounding: most[0].max(most[1]) * f64::from(f32::EPSILON), ..self }
     }
 
     /// Names the table, which never changes; that of clones is the same.
@@ -287,6 +298,12 @@ impl RayTransfer {
     /// one thing that can be seen from another.
     pub fn huge_range(&self) -> f64 {
         HUGE_RANGE * self.entries.len() as f64 / self.bin_from_texel[0]
+    }
+
+    /// How far from a step of the transfer function the texel of a constant cell may have been rounded across it, in
+    /// texels; 0 where texels are exact.
+    pub fn flat_rounding(&self) -> f64 {
+        self.flat_rounding
     }
 
     /// The bands in order, without a gap; at least two.

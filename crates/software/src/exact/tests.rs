@@ -111,8 +111,12 @@ fn cells_of_every_kind_are_those_of_the_reference() {
                 value_range: [0.0, 1.0],
             };
             let transfer = RayTransfer::new(&tf, &layout);
-            let bands =
-                Bands { bands: transfer.bands(), depth_scale: transfer.depth_scale() as f32, huge: 1e3 };
+            let bands = Bands {
+                bands: transfer.bands(),
+                depth_scale: transfer.depth_scale() as f32,
+                huge: 1e3,
+                flat_rounding: 0.0,
+            };
             let mut powers = cubic(&corners, from, to);
             powers[0] -= transfer.texel_origin();
             let range = [f64::min, f64::max]

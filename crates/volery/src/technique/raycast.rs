@@ -53,9 +53,12 @@ impl Technique<VolumeData> for Raycast {
         let transfer = view.of_values()?;
         let store = volume.store_for(transfer);
         let layout = &store.layout;
-        let table =
-            self.table.get(&(transfer.clone(), layout.revision), || RayTransfer::new(transfer, layout));
         let source = volume.source();
+        let table = self.table.get(&(transfer.clone(), layout.revision), || {
+            let table = RayTransfer::new(transfer, layout);
+            let is_rounded = store.encoding.blurs(transfer, source.sample_type());
+            if is_rounded { table.of_rounded_texels() } else { table }
+        });
         let nodes = source.layout();
         let seen =
             (Transparency { source, transfer }, Frustum::new(nodes, &view.camera, view.width, view.height));

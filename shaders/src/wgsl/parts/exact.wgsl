@@ -209,7 +209,7 @@ fn rounding_of(range: vec2f) -> f32 {
     let width = range.y - range.x;
     let places = max(PLACE_ROUNDING, 2.4e-7 * largest(frame.cells));
     let digits = 1.2e-7 * max(abs(range.x), abs(range.y));
-    return select(0.0, width * places + digits, width > 0.0);
+    return select(frame.flat_rounding, width * places + digits, width > 0.0);
 }
 
 // Adds the light of one cell, along whose way the texel is this cubic; `length` is the way's optical depth to the base
