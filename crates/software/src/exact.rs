@@ -41,7 +41,7 @@ const MAX_DEPTH: f32 = 1.0;
 const MIN_TINT: f32 = 1e-3;
 
 /// What a channel may be off by, as a share of the light that a cell takes: above all that was found in a test.
-pub(crate) const EXACT_DOUBT: f32 = 0.0025;
+pub(crate) const EXACT_DOUBT: f32 = 0.003;
 
 /// How exactly a place in a cell is known, in cells: what a field is off by, as a share of the range of the corners.
 pub(crate) const PLACE_ROUNDING: f32 = 1e-5;

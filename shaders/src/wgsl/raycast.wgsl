@@ -90,8 +90,9 @@ const INVISIBLE: f32 = 1e-30;
 // a part of a cell: beside an outlier what can be seen is passed in less than that, and holds nothing.
 const MIN_STRETCH: f32 = 0.015625;
 const MAX_DOUBT: f32 = 0.001;
-// What a channel may be off by where a cell was integrated exactly, as a share of the light that it takes.
-const EXACT_DOUBT: f32 = 0.0025;
+// What a channel may be off by where a cell was integrated exactly, as a share of the light that it takes: above most that
+// was found, in dense combs of opaque bands.
+const EXACT_DOUBT: f32 = 0.0075;
 // Longer than any ray.
 const FAR: f32 = 1e30;
 // Pixels per edge of a workgroup's tile.
