@@ -88,6 +88,7 @@ properties! { $
         opaque_matter_hides_what_is_behind
         opaque_step_stands_at_its_value
         thin_shell_is_not_missed
+        opaque_bands_beside_padding_are_passed
         thin_matter_above_opaque_values
         dense_cells_show_their_front;
     views:

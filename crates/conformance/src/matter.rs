@@ -230,6 +230,39 @@ pub fn thin_shell_is_not_missed(backend: &mut dyn Backend) {
     assert_close("thin shell", &image, &expected, 0.02, 2e-3);
 }
 
+/// Half of a volume is padding far above all that is seen. Between two samples rays pass every value from one to the
+/// other, an opaque band of values among them, however short the way: they show the end of the band at which they enter.
+pub fn opaque_bands_beside_padding_are_passed(backend: &mut dyn Backend) {
+    // Where blocks of cells end that a backend may leap over.
+    let edge = 6.0;
+    let volume = Volume::new([16, 15, 18], DVec3::ONE, Storage::F32, move |p| {
+        if p.x > edge { 1e12 } else { 0.2 + 0.1 * (0.9 * p.x + 1.7 * p.y + 0.6 * p.z).sin() }
+    });
+    let (low, high) = ([1.0, 0.2, 0.1], [0.1, 0.4, 1.0]);
+    let point = |value: f64, [r, g, b]: [f64; 3], opacity: f64| [value, r, g, b, opacity];
+    let points = [(0.5, low, 0.0), (0.5, low, 1.0), (0.6, high, 1.0), (0.6, high, 0.0)];
+    let tf = transfer(&points.map(|(value, color, opacity)| point(value, color, opacity)), 1.0);
+    for (azimuth, is_orthographic) in [(35.0, false), (155.0, true), (215.0, false), (330.0, true)] {
+        let camera = Camera::fitted(volume.extent(), azimuth, 25.0, 1.2, is_orthographic);
+        let expected = each_pixel(&camera, SIZE, |ray| {
+            // The way through samples that can be seen and the cells behind them; from the other side it ends with these.
+            let end = DVec3::new(edge, volume.extent().y, volume.extent().z);
+            let rises = ray.direction.x > 0.0;
+            match chord(ray, DVec3::ZERO, end) {
+                Some([from, to]) => {
+                    let at = ray.origin.x + ray.direction.x * if rises { to } else { from };
+                    let crosses = (at - edge).abs() < 1e-9;
+                    if crosses { if rises { low } else { high } } else { BACKGROUND_F64 }
+                }
+                None => BACKGROUND_F64,
+            }
+        });
+        assert_shows_something("padding", &expected, BACKGROUND_F64);
+        let image = draw(backend, &volume, &tf, &camera, SIZE);
+        assert_close(&format!("padding from {azimuth}"), &image, &expected, 1e-3, 1e-4);
+    }
+}
+
 /// Thin matter whose values lie above those of opaque matter: sums over values must not drown it.
 pub fn thin_matter_above_opaque_values(backend: &mut dyn Backend) {
     let volume = Volume::new([18, 17, 33], DVec3::ONE, Storage::F32, |p| {

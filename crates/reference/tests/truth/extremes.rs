@@ -437,3 +437,43 @@ fn opaque_matter_is_opaque_at_any_scale() {
         assert_eq!((light.color, light.transmittance), (COLOR, 0.0), "spacing {spacing:e}");
     }
 }
+
+/// Padding beside what can be seen: between two samples a ray passes all values from one to the other, however far apart,
+/// and shows the end of an opaque band at which it enters.
+#[test]
+fn bands_beside_padding_are_passed() {
+    for padding in [1e20, 3e18, 1e18, -1e17, 1e9] {
+        bands_beside(padding);
+    }
+}
+
+fn bands_beside(padding: f64) {
+    let dims = [6, 5, 4];
+    let value = |i: u32| if i % 6 < 3 { -500.0 * padding.signum() + f64::from(i % 17) } else { padding };
+    let values: Vec<f64> = (0..120).map(value).collect();
+    let grid = VoxelGrid::new(dims, DVec3::new(1.0, 0.7, 1.3), values).expect("120 samples");
+    // A band between what can be seen and the padding: its end towards what can be seen is near, its other far.
+    let (near, far) = ([0.9, 0.5, 0.2], [0.1, 0.3, 0.8]);
+    let points = if padding > 0.0 {
+        [(-250.0, near, 0.0), (-250.0, near, 1.0), (-248.0, far, 1.0), (-248.0, far, 0.0)]
+    } else {
+        [(248.0, far, 0.0), (248.0, far, 1.0), (250.0, near, 1.0), (250.0, near, 0.0)]
+    };
+    let tf = transfer(&points, 1.0);
+    let tracer = Tracer::new(&grid, &tf).expect("scalars");
+    let mut random = Random::new(9);
+    let mut num = 0;
+    for _ in 0..2000 {
+        // Through the middle of the face on which the last samples that can be seen lie.
+        let place = DVec3::new(2.0, 0.1 + 2.6 * random.unit(), 0.1 + 3.7 * random.unit());
+        let direction = DVec3::new(0.3 + random.unit(), random.unit() - 0.5, random.unit() - 0.5).normalize();
+        for (direction, expected) in [(direction, near), (-direction, far)] {
+            let light = tracer.trace(&Ray { origin: place - direction * 20.0, direction });
+            assert_eq!(light.transmittance, 0.0, "{place} {direction}");
+            let off = (0..3).map(|i| (light.color[i] - expected[i]).abs()).fold(0.0, f64::max);
+            assert!(off < THRESHOLD, "{place} {direction}: {:?}, expected {expected:?}", light.color);
+            num += 1;
+        }
+    }
+    println!("{num} rays pass a band beside {padding:e}");
+}
