@@ -477,3 +477,29 @@ fn bands_beside(padding: f64) {
     }
     println!("{num} rays pass a band beside {padding:e}");
 }
+
+/// A ray that enters opaque matter through the last samples before padding sees what those are, whatever lies behind.
+#[test]
+fn faces_before_padding_are_seen_exactly() {
+    let seen = |i: u32| -500.0 + 13.0 * f64::from(i * 7 % 17);
+    let band = [(-520.0, [0.9, 0.5, 0.2], 1.0), (-280.0, [0.1, 0.3, 0.8], 1.0)];
+    let (solid, mut random) = (transfer(&band, 1.0), Random::new(10));
+    let with = |padding: f64| {
+        let values: Vec<f64> = (0..60).map(|i| if i % 3 < 2 { padding } else { seen(i) }).collect();
+        VoxelGrid::new([3, 5, 4], DVec3::ONE, values).expect("60 samples")
+    };
+    let plain = with(-400.0);
+    for padding in [1e20, -1e17, 1e12] {
+        let padded = with(padding);
+        let tracers = [&plain, &padded].map(|grid| Tracer::new(grid, &solid).expect("scalars"));
+        for _ in 0..500 {
+            let place = DVec3::new(2.0, 4.0 * random.unit(), 3.0 * random.unit());
+            let direction =
+                DVec3::new(-0.1 - random.unit(), random.unit() - 0.5, random.unit() - 0.5).normalize();
+            let ray = Ray { origin: place - direction * 20.0, direction };
+            let [plain, padded] = tracers.each_ref().map(|tracer| tracer.trace(&ray));
+            let off = (0..3).map(|i| (plain.color[i] - padded.color[i]).abs()).fold(0.0, f64::max);
+            assert!(off < THRESHOLD, "{padding:e}: {ray:?}: {:?}, expected {:?}", padded.color, plain.color);
+        }
+    }
+}
