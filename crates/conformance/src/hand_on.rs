@@ -61,6 +61,24 @@ macro_rules! hand_on {
             $to.begin(view)
         }
     };
+    (@begin_windows $this:ident, $to:expr) => {
+        fn begin_windows(
+            &mut $this,
+            view: &::volery_frame::PictureView<'_>,
+            side: u32,
+        ) -> Result<(), ::volery_frame::DrawError> {
+            $to.begin_windows(view, side)
+        }
+    };
+    (@draw_window $this:ident, $to:expr) => {
+        fn draw_window(
+            &mut $this,
+            content: &::volery_frame::Content<'_>,
+            window: u32,
+        ) -> Result<u32, ::volery_frame::DrawError> {
+            $to.draw_window(content, window)
+        }
+    };
     (@draw_part $this:ident, $to:expr) => {
         fn draw_part(
             &mut $this,

@@ -40,6 +40,7 @@ mod sheet_oracle;
 mod sheets;
 mod surfaces;
 mod views;
+mod windows;
 mod world;
 
 use volery_frame::Backend;
@@ -219,6 +220,9 @@ properties! { $
         finished_parts_are_told_once
         times_of_parts_add_up
         pictures_are_begun_and_ended;
+    windows:
+        windows_show_their_content_alone
+        windows_that_are_none_are_refused;
 }
 
 #[cfg(doctest)]

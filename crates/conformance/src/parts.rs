@@ -17,10 +17,10 @@ use super::world::{
     marschner_lobb, smooth_transfer, transfer,
 };
 
-const SIZE: [u32; 2] = [97, 61];
+pub(super) const SIZE: [u32; 2] = [97, 61];
 
 /// Root mean square difference between a picture and the same in parts.
-const MAX_RMSE: f64 = 1e-6;
+pub(super) const MAX_RMSE: f64 = 1e-6;
 
 /// What worlds are painted in, and what stands before them.
 const PAINTS: [[f64; 3]; 2] = [[0.9, 0.1, 0.2], [0.1, 0.3, 0.8]];
@@ -36,7 +36,7 @@ const NUM_TIMED: usize = 5;
 const MIN_TIMED: f64 = 0.7;
 
 /// Everything that can be seen of one volume.
-struct World {
+pub(super) struct World {
     camera: Camera,
     volume: Volume,
     bricks: Vec<JoinedBrick>,
@@ -54,11 +54,11 @@ struct World {
     sheets: Vec<Sheet>,
     slabs: Vec<Sheet>,
     sheet_transfer: SheetTransfer,
-    meshes: [TriangleMesh; 2],
+    pub(super) meshes: [TriangleMesh; 2],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
+pub(super) enum Kind {
     Rays,
     Planes,
     Cubes,
@@ -67,11 +67,11 @@ enum Kind {
     Slabs,
 }
 
-const KINDS: [Kind; 5] = [Kind::Rays, Kind::Planes, Kind::Cubes, Kind::Sheets, Kind::Slabs];
+pub(super) const KINDS: [Kind; 5] = [Kind::Rays, Kind::Planes, Kind::Cubes, Kind::Sheets, Kind::Slabs];
 
 impl World {
     /// Resident in a backend.
-    fn new(backend: &mut dyn Backend, is_orthographic: bool) -> Self {
+    pub(super) fn new(backend: &mut dyn Backend, is_orthographic: bool) -> Self {
         let storage = Storage { brick_cells: 4, ..Storage::unit(TexelType::U8) };
         let volume =
             Volume::new([23, 21, 25], DVec3::new(1.0, 1.1, 0.9), storage, marschner_lobb([22, 20, 24]));
@@ -144,13 +144,13 @@ impl World {
         self
     }
 
-    fn view<'a>(&self, meshes: &'a [TriangleMesh]) -> PictureView<'a> {
+    pub(super) fn view<'a>(&self, meshes: &'a [TriangleMesh]) -> PictureView<'a> {
         let [width, height] = SIZE;
         PictureView { width, height, camera: self.camera, background: BACKGROUND, meshes }
     }
 
     /// One kind of content in so many parts, front to back; some may be empty.
-    fn cut(&self, kind: Kind, num: usize) -> Vec<Content<'_>> {
+    pub(super) fn cut(&self, kind: Kind, num: usize) -> Vec<Content<'_>> {
         fn part<T>(list: &[T], number: usize, num: usize) -> &[T] {
             &list[number * list.len() / num..(number + 1) * list.len() / num]
         }
@@ -190,11 +190,16 @@ impl World {
         (0..num).map(content).collect()
     }
 
-    fn whole(&self, kind: Kind) -> Content<'_> {
+    pub(super) fn whole(&self, kind: Kind) -> Content<'_> {
         self.cut(kind, 1)[0]
     }
 
-    fn draw(&self, backend: &mut dyn Backend, meshes: &[TriangleMesh], content: Content<'_>) -> Drawn {
+    pub(super) fn draw(
+        &self,
+        backend: &mut dyn Backend,
+        meshes: &[TriangleMesh],
+        content: Content<'_>,
+    ) -> Drawn {
         let frame = Frame { view: self.view(meshes), content };
         backend.draw(&frame).expect("the suite's frames are right")
     }
@@ -244,11 +249,11 @@ fn draw_parts(backend: &mut dyn Backend, view: &PictureView<'_>, parts: &[Conten
     backend.finish().expect("a picture was begun")
 }
 
-fn wide(image: &Image) -> Vec<[f64; 3]> {
+pub(super) fn wide(image: &Image) -> Vec<[f64; 3]> {
     image.pixels.iter().map(|pixel| pixel.map(f64::from)).collect()
 }
 
-fn assert_like(what: &str, found: &Image, expected: &Image, max_rmse: f64) {
+pub(super) fn assert_like(what: &str, found: &Image, expected: &Image, max_rmse: f64) {
     let [max, rmse] = difference(found, &wide(expected));
     println!("{what}: max {max:.2e}, rmse {rmse:.2e} (threshold {max_rmse:e})");
     assert!(rmse <= max_rmse, "{what}: rmse {rmse:e}, expected at most {max_rmse:e}");

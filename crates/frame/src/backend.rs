@@ -168,6 +168,16 @@ pub enum DrawError {
         /// Most pixels per axis.
         max: u32,
     },
+    /// Windows of a size that is none, or none of this number.
+    #[error("draw: {what} of windows is {found}, expected {expected}")]
+    Window {
+        /// Which number.
+        what: &'static str,
+        /// What it is.
+        found: u32,
+        /// What it may be.
+        expected: String,
+    },
     /// Rays through texels that have no extinction.
     #[error("draw: rays through texels that are colours, expected texels of type U8, U16 or F32")]
     RaysThroughColors,
@@ -200,6 +210,39 @@ pub enum DrawError {
     /// The device failed.
     #[error("device: {0}")]
     Device(String),
+}
+
+/// Sides of windows are multiples of so many pixels.
+pub const WINDOW_STEP: u32 = 32;
+
+/// The longest side of a window, in pixels.
+pub const MAX_WINDOW_SIDE: u32 = 1024;
+
+/// How many windows a picture has, of a side; a check that every backend makes before it begins them.
+///
+/// # Errors
+/// [`DrawError::Window`].
+pub fn check_windows(view: &PictureView<'_>, side: u32) -> Result<u32, DrawError> {
+    if !(WINDOW_STEP..=MAX_WINDOW_SIDE).contains(&side) || !side.is_multiple_of(WINDOW_STEP) {
+        let expected = format!("a multiple of {WINDOW_STEP} up to {MAX_WINDOW_SIDE}");
+        return Err(DrawError::Window { what: "the side", found: side, expected });
+    }
+    Ok(view.width.div_ceil(side) * view.height.div_ceil(side))
+}
+
+/// A check that every backend makes before it draws a window, of which a picture has so many.
+///
+/// # Errors
+/// [`DrawError::Window`].
+pub fn check_window(window: u32, num_windows: u32) -> Result<(), DrawError> {
+    if window < num_windows {
+        return Ok(());
+    }
+    let expected = match num_windows {
+        0 => "a picture in windows".to_owned(),
+        _ => format!("0 to {}", num_windows - 1),
+    };
+    Err(DrawError::Window { what: "the number", found: window, expected })
 }
 
 /// Executes frames. Holds the bricks of one volume at a time.
@@ -240,6 +283,20 @@ pub trait Backend: Send {
     /// # Errors
     /// When the picture's size is none or the device fails. Then no picture is under way.
     fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError>;
+
+    /// Begins a picture that is drawn window by window: squares of so many pixels a side, a multiple of
+    /// [`WINDOW_STEP`] up to [`MAX_WINDOW_SIDE`], cut short where the picture ends; they count from 0, row by row. One that is under way is dropped.
+    ///
+    /// # Errors
+    /// As [`Backend::begin`], and [`DrawError::Window`] when `side` is no such number.
+    fn begin_windows(&mut self, view: &PictureView<'_>, side: u32) -> Result<(), DrawError>;
+
+    /// Shows content alone in a window, in place of what was there, and returns the number of the part. A window can so be
+    /// drawn better when there is time left. Need not wait until the device has drawn it.
+    ///
+    /// # Errors
+    /// As [`Backend::draw_part`], and [`DrawError::Window`] when there is no such window.
+    fn draw_window(&mut self, content: &Content<'_>, window: u32) -> Result<u32, DrawError>;
 
     /// Adds what comes next to the picture, behind all that it shows, and returns the number of the part: parts count
     /// from 0. Need not wait until the device has drawn it.

@@ -21,6 +21,9 @@
 //! the content's own. So a picture may show what would not fit a device at one time, be looked at between parts, and be
 //! left when there is no more time.
 //!
+//! Or a picture is drawn window by window, each shown by one content in place of what it showed: by coarse bricks first,
+//! by better ones as long as there is time.
+//!
 //! # Guarantees
 //! A picture depends on the frame alone: not on the number of threads, nor on the order of uploads, nor on what a
 //! backend kept of others.

@@ -61,7 +61,7 @@ mod walk;
 use std::time::Instant;
 
 use fearless_simd::Level;
-use volery_frame::backend::{check_content, check_view};
+use volery_frame::backend::{check_content, check_view, check_window, check_windows};
 use volery_frame::{
     Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, Frame, PictureView,
     Revision, UploadError, UploadedBytes, VolumeLayout,
@@ -224,6 +224,28 @@ impl Backend for SoftwareBackend {
         self.picture = Some(Target::new(view));
         self.seconds = start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    fn begin_windows(&mut self, view: &PictureView<'_>, side: u32) -> Result<(), DrawError> {
+        self.begin(view)?;
+        let checked = check_windows(view, side);
+        self.picture = self.picture.take().filter(|_| checked.is_ok());
+        if let Some(picture) = &mut self.picture {
+            picture.window_side = Some(side);
+        }
+        checked.map(drop)
+    }
+
+    fn draw_window(&mut self, content: &Content<'_>, window: u32) -> Result<u32, DrawError> {
+        let picture = self.picture.as_mut().ok_or(DrawError::NoPicture)?;
+        let num_windows = picture.window_side.map_or(Ok(0), |side| check_windows(&picture.view, side))?;
+        check_window(window, num_windows)?;
+        picture.window = Some(window);
+        let number = self.draw_some(content, true);
+        if let Some(picture) = &mut self.picture {
+            picture.window = None;
+        }
+        number
     }
 
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {

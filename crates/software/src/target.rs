@@ -31,6 +31,9 @@ pub(crate) type Light = [[f32; 16]; 4];
 /// The numbers of a [`RayDoubt`] of a packet's rays.
 pub(crate) type Doubt = [[f32; 16]; 3];
 
+/// Of rays that have met nothing.
+const DARK: Light = [[0.0; 16], [0.0; 16], [0.0; 16], [1.0; 16]];
+
 /// Red, green, blue and transmittance of the pixels of a tile, row by row.
 pub(crate) type Rows = [[f32; 4]; NUM_PIXELS];
 
@@ -43,6 +46,9 @@ pub(crate) struct Target {
     /// Row by row; whole even where they reach over the edge of the picture.
     pub(crate) tiles: Vec<Tile>,
     pub(crate) shown: Shown,
+    /// Pixels of a window per axis, if it is drawn in windows; and the one that is drawn now.
+    pub(crate) window_side: Option<u32>,
+    pub(crate) window: Option<u32>,
 }
 
 /// What the parts so far were.
@@ -67,8 +73,7 @@ impl Tile {
     /// Packets row by row.
     #[inline]
     pub(crate) fn light(&mut self) -> &mut [Light; NUM_PACKETS] {
-        self.light
-            .get_or_insert_with(|| Box::new([[[0.0; 16], [0.0; 16], [0.0; 16], [1.0; 16]]; NUM_PACKETS]))
+        self.light.get_or_insert_with(|| Box::new([DARK; NUM_PACKETS]))
     }
 
     #[inline]
@@ -101,6 +106,16 @@ impl Tile {
         }
     }
 
+    /// Forgets what it shows, not its memory.
+    fn clear(&mut self) {
+        if let Some(light) = &mut self.light {
+            light.fill(DARK);
+        }
+        if let Some(doubts) = &mut self.doubts {
+            doubts.fill([[0.0; 16]; 3]);
+        }
+    }
+
     fn worst_doubt(&self) -> RayDoubt {
         let worst = |number: usize| {
             let packets = self.doubts.iter().flat_map(|doubts| doubts.iter());
@@ -126,15 +141,34 @@ impl Target {
             surfaces: Surfaces::new(view),
             tiles: std::iter::repeat_with(Tile::default).take(num_tiles).collect(),
             shown: Shown::default(),
+            window_side: None,
+            window: None,
         }
     }
 
-    /// Runs `draw` for every tile, with the surfaces, its number and the column and row of its first pixel.
+    /// First and last tile along x and y of what is drawn now.
+    pub(crate) fn tile_range(&self) -> [[u32; 2]; 2] {
+        let last = [self.view.width, self.view.height].map(|pixels| (pixels - 1) / TILE);
+        let Some((window, side)) = self.window.zip(self.window_side) else { return [[0; 2], last] };
+        let [tiles, across] = [side / TILE, self.view.width.div_ceil(side)];
+        let first = [window % across * tiles, window / across * tiles];
+        [first, [0, 1].map(|axis| last[axis].min(first[axis] + tiles - 1))]
+    }
+
+    /// Runs `draw` for every tile that is drawn now, with the surfaces, its number and the column and row of its first
+    /// pixel. The tiles of a window show nothing before.
     pub(crate) fn draw_tiles(&mut self, draw: impl Fn(&Surfaces, u32, [u32; 2], &mut Tile) + Sync) {
         let columns = self.view.width.div_ceil(TILE);
+        let [[x0, y0], [x1, y1]] = self.tile_range();
+        let is_drawn =
+            |index: u32| (x0..=x1).contains(&(index % columns)) && (y0..=y1).contains(&(index / columns));
+        let is_window = self.window.is_some();
         let Self { surfaces, tiles, .. } = self;
-        tiles.par_iter_mut().enumerate().for_each(|(index, tile)| {
-            let index = index as u32;
+        let tiles: Vec<_> = (0..).zip(tiles).filter(|(index, _)| is_drawn(*index)).collect();
+        tiles.into_par_iter().for_each(|(index, tile)| {
+            if is_window {
+                tile.clear();
+            }
             draw(surfaces, index, [index % columns * TILE, index / columns * TILE], tile);
         });
     }

@@ -52,7 +52,7 @@ pub(crate) fn draw<T: Texel>(
     bricks: &Bricks<T>,
 ) -> Result<(), DrawError> {
     let Rays { transfer, bricks: placed_bricks } = *content;
-    let projector = Projector::new(&target.view, layout);
+    let projector = Projector::new(&target.view, layout, target.tile_range());
     let stored: Vec<_> = placed_bricks
         .iter()
         .map(|brick| {
@@ -118,11 +118,12 @@ struct Projector {
     pixel: f64,
     perspective: bool,
     spacing: DVec3,
-    last_tile: [u32; 2],
+    /// First and last tile that count.
+    range: [[u32; 2]; 2],
 }
 
 impl Projector {
-    fn new(picture: &PictureView<'_>, layout: &VolumeLayout) -> Self {
+    fn new(picture: &PictureView<'_>, layout: &VolumeLayout, range: [[u32; 2]; 2]) -> Self {
         let [right, up, forward] = picture.camera.axes();
         let rays = picture.camera.rays(picture.width, picture.height);
         let perspective = matches!(picture.camera.projection, Projection::Perspective { .. });
@@ -137,11 +138,11 @@ impl Projector {
             pixel: step.length(),
             perspective,
             spacing: layout.spacing,
-            last_tile: [picture.width, picture.height].map(|n| (n - 1) / TILE),
+            range,
         }
     }
 
-    /// First and last tile along x and y; `None` when the box is out of sight. Too many rather than too few.
+    /// First and last tile along x and y among those that count; `None` when the box is in none of them. Too many rather than too few.
     fn tiles(&self, bounds: [[f64; 3]; 2]) -> Option<[[u32; 2]; 2]> {
         let mut range = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         let mut behind = 0;
@@ -162,13 +163,13 @@ impl Projector {
         }
         match (self.perspective, behind) {
             (_, 8) => return None,
-            (true, 1..) => return Some([[0, 0], self.last_tile]),
+            (true, 1..) => return Some(self.range),
             _ => {}
         }
         // One pixel more on each side than the mathematics asks for.
         let tile = |pixel: f64| (pixel / f64::from(TILE)).floor();
-        let first = [0, 1].map(|axis| tile(range[0][axis] - 1.0).max(0.0));
-        let last = [0, 1].map(|axis| tile(range[1][axis] + 1.0).min(f64::from(self.last_tile[axis])));
+        let first = [0, 1].map(|axis| tile(range[0][axis] - 1.0).max(f64::from(self.range[0][axis])));
+        let last = [0, 1].map(|axis| tile(range[1][axis] + 1.0).min(f64::from(self.range[1][axis])));
         (0..2).all(|axis| first[axis] <= last[axis]).then(|| [first, last].map(|tile| tile.map(|x| x as u32)))
     }
 }

@@ -1,6 +1,6 @@
 //! The backend: one volume's bricks, and what of the last frame can be used again.
 
-use volery_frame::backend::{check_content, check_view};
+use volery_frame::backend::{check_content, check_view, check_window, check_windows};
 use volery_frame::{
     Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, PictureView,
     Revision, UploadError, UploadedBytes, VolumeLayout,
@@ -144,13 +144,46 @@ impl WgpuBackend {
     }
 
     /// Begins a picture of a checked view.
-    fn begin_picture(&mut self, view: &PictureView<'_>) -> Result<Picture, Failure> {
-        let kept = match self.kept.take().filter(|kept| kept.fits(view)) {
+    fn begin_picture(
+        &mut self,
+        view: &PictureView<'_>,
+        window_side: Option<u32>,
+    ) -> Result<Picture, Failure> {
+        let kept = match self.kept.take().filter(|kept| kept.fits(view, window_side)) {
             Some(kept) => kept,
-            None => Kept::new(&self.gpu, [view.width, view.height])?,
+            None => Kept::new(&self.gpu, [view.width, view.height], window_side)?,
         };
         let surfaces = self.surfaces.draw(&self.gpu, &mut self.jobs, view, kept.tiles())?;
         Ok(Picture::new(view, kept, surfaces))
+    }
+
+    fn begin_checked(&mut self, view: &PictureView<'_>, window_side: Option<u32>) -> Result<(), DrawError> {
+        self.kept = self.picture.take().map(Picture::into_kept).or(self.kept.take());
+        self.jobs.clear(window_side.is_some());
+        check_view(view, MAX_SIZE)?;
+        if let Some(side) = window_side {
+            check_windows(view, side)?;
+        }
+        self.picture = Some(self.begin_picture(view, window_side).map_err(device)?);
+        Ok(())
+    }
+
+    /// Draws a part of the whole picture or in one window.
+    fn draw_some(&mut self, content: &Content<'_>, window: Option<u32>) -> Result<u32, DrawError> {
+        let picture = self.picture.as_mut().ok_or(DrawError::NoPicture)?;
+        if let Some(window) = window {
+            check_window(window, picture.num_windows())?;
+        }
+        picture.set_window(window);
+        check_content(content, self.pool.as_ref().map(Pool::layout))?;
+        if let Some(brick) = content.bricks().find(|brick| !self.is_resident(brick.id)) {
+            return Err(DrawError::NotResident { id: brick.id });
+        }
+        // A picture in which the device failed is dropped.
+        let mut picture = self.picture.take().ok_or(DrawError::NoPicture)?;
+        let number = self.add(&mut picture, content).map_err(device)?;
+        self.picture = Some(picture);
+        Ok(number)
     }
 }
 
@@ -198,26 +231,19 @@ impl Backend for WgpuBackend {
     }
 
     fn begin(&mut self, view: &PictureView<'_>) -> Result<(), DrawError> {
-        self.kept = self.picture.take().map(Picture::into_kept).or(self.kept.take());
-        self.jobs.clear();
-        check_view(view, MAX_SIZE)?;
-        self.picture = Some(self.begin_picture(view).map_err(device)?);
-        Ok(())
+        self.begin_checked(view, None)
+    }
+
+    fn begin_windows(&mut self, view: &PictureView<'_>, side: u32) -> Result<(), DrawError> {
+        self.begin_checked(view, Some(side))
     }
 
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
-        if self.picture.is_none() {
-            return Err(DrawError::NoPicture);
-        }
-        check_content(content, self.pool.as_ref().map(Pool::layout))?;
-        if let Some(brick) = content.bricks().find(|brick| !self.is_resident(brick.id)) {
-            return Err(DrawError::NotResident { id: brick.id });
-        }
-        // A picture in which the device failed is dropped.
-        let mut picture = self.picture.take().ok_or(DrawError::NoPicture)?;
-        let number = self.add(&mut picture, content).map_err(device)?;
-        self.picture = Some(picture);
-        Ok(number)
+        self.draw_some(content, None)
+    }
+
+    fn draw_window(&mut self, content: &Content<'_>, window: u32) -> Result<u32, DrawError> {
+        self.draw_some(content, Some(window))
     }
 
     fn finished(&mut self) -> Vec<FinishedPart> {

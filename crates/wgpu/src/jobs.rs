@@ -17,6 +17,8 @@ pub(crate) struct Jobs {
     pending: Vec<Job>,
     told: Vec<FinishedPart>,
     totals: Totals,
+    /// Whether a ray is of one part alone, not of all.
+    has_windows: bool,
     free: Vec<Slip>,
 }
 
@@ -123,10 +125,15 @@ impl Jobs {
             if let Some(seconds) = seconds {
                 *self.totals.device_seconds.get_or_insert(0.0) += seconds;
             }
-            // Of each ray it is no more than the sum of the largest.
-            self.totals.doubt.cells += doubt.cells;
-            self.totals.doubt.table_way += doubt.table_way;
-            self.totals.doubt.touching += doubt.touching;
+            let total = &mut self.totals.doubt;
+            if self.has_windows {
+                *total = total.max(doubt);
+            } else {
+                // Of each ray it is no more than the sum of the largest.
+                total.cells += doubt.cells;
+                total.table_way += doubt.table_way;
+                total.touching += doubt.touching;
+            }
             self.told.extend(part.map(|number| FinishedPart { number, device_seconds: seconds }));
         }
         Ok(())
@@ -141,8 +148,9 @@ impl Jobs {
         self.totals
     }
 
-    /// Forgets a picture.
-    pub(crate) fn clear(&mut self) {
+    /// Forgets a picture, for one that is drawn in windows or not.
+    pub(crate) fn clear(&mut self, has_windows: bool) {
+        self.has_windows = has_windows;
         self.pending.clear();
         self.told.clear();
         self.totals = Totals::default();

@@ -1,8 +1,11 @@
 //! The picture under way: tiles, in each what its pixels have gathered; and its end.
 //!
 //! # Method
-//! No buffer holds a large picture, so it lies in tiles of at most 64 MiB. A part goes to the device tile by tile, and
-//! nobody waits for it. At the end each tile is put before surfaces or background and read, or shown in a texture.
+//! No buffer holds a large picture, so it lies in tiles of at most 64 MiB; the tiles of a picture in windows are these. A
+//! part goes to the device tile by tile, and nobody waits for it. At the end each tile is put before surfaces or
+//! background and read, or shown in a texture.
+
+use std::ops::Range;
 
 use volery_frame::{Drawn, Image, PictureView, Sheets};
 use volery_shaders::finish;
@@ -18,6 +21,12 @@ const TILE: u32 = 2048;
 /// Bytes of what a pixel has gathered, and of what is read of it.
 const GATHERED_BYTES: u64 = 16;
 const PIXEL_BYTES: u64 = 12;
+
+/// Bindings may begin at multiples of so many bytes on every device.
+const BINDING_STEP: u64 = 256;
+
+/// Most bytes of tiles that are read at one time, if they are several.
+const MAX_BATCH_BYTES: u64 = 3 << 22;
 
 /// The least and the largest number of each channel that may be shown.
 type Colors = [[f32; 3]; 2];
@@ -56,11 +65,14 @@ pub(crate) struct PictureTile {
     pub(crate) tile: Tile,
     /// Colour and transmittance of each pixel.
     pub(crate) gathered: wgpu::Buffer,
+    /// Whether a part went to the device, so that it holds something.
+    has_light: bool,
 }
 
 /// Tiles that the next picture of that size can take over.
 pub(crate) struct Kept {
     size: [u32; 2],
+    window_side: Option<u32>,
     tiles: Vec<PictureTile>,
 }
 
@@ -70,6 +82,9 @@ pub(crate) struct Picture {
     pub(crate) view: PictureView<'static>,
     pub(crate) surfaces: PictureSurfaces,
     pub(crate) tiles: Vec<PictureTile>,
+    window_side: Option<u32>,
+    /// The tile that is drawn alone, if one is.
+    window: Option<usize>,
     shown: Shown,
 }
 
@@ -77,8 +92,6 @@ pub(crate) struct Picture {
 #[derive(Clone, Copy, Debug, Default)]
 struct Shown {
     num_parts: u32,
-    /// Whether a part went to the device, so that the tiles hold something.
-    has_light: bool,
     has_rays: bool,
     /// What the parts can show; any colour if one of them says nothing.
     colors: Option<Colors>,
@@ -101,11 +114,12 @@ impl PartKind {
 }
 
 impl Kept {
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self, Failure> {
+    /// Tiles of a picture that is drawn whole, or in windows.
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], window_side: Option<u32>) -> Result<Self, Failure> {
         let limits = gpu.device.limits();
         let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         let fits = |most: &u32| u64::from(*most) * u64::from(*most) * GATHERED_BYTES <= bytes;
-        let most = [TILE, TILE / 2, TILE / 4].into_iter().find(fits).unwrap_or(TILE / 8);
+        let whole = || [TILE, TILE / 2, TILE / 4].into_iter().find(fits).unwrap_or(TILE / 8);
         let tiles = gpu.checked(|| {
             let tile = |tile: Tile| PictureTile {
                 tile,
@@ -115,14 +129,15 @@ impl Kept {
                     usage: wgpu::BufferUsages::STORAGE,
                     mapped_at_creation: false,
                 }),
+                has_light: false,
             };
-            Tile::of_picture(size, most).map(tile).collect()
+            Tile::of_picture(size, window_side.unwrap_or_else(whole)).map(tile).collect()
         })?;
-        Ok(Self { size, tiles })
+        Ok(Self { size, window_side, tiles })
     }
 
-    pub(crate) fn fits(&self, view: &PictureView<'_>) -> bool {
-        self.size == [view.width, view.height]
+    pub(crate) fn fits(&self, view: &PictureView<'_>, window_side: Option<u32>) -> bool {
+        self.size == [view.width, view.height] && self.window_side == window_side
     }
 
     pub(crate) fn tiles(&self) -> &[PictureTile] {
@@ -133,17 +148,37 @@ impl Kept {
 impl Picture {
     pub(crate) fn new(view: &PictureView<'_>, kept: Kept, surfaces: PictureSurfaces) -> Self {
         let view = PictureView { meshes: &[], ..*view };
-        Self { view, surfaces, tiles: kept.tiles, shown: Shown::default() }
+        let Kept { window_side, mut tiles, .. } = kept;
+        tiles.iter_mut().for_each(|tile| tile.has_light = false);
+        Self { view, surfaces, tiles, window_side, window: None, shown: Shown::default() }
     }
 
-    /// Whether nothing was gathered yet.
-    pub(crate) fn is_first(&self) -> bool {
-        !self.shown.has_light
+    /// Draws one window alone from now on, or all.
+    pub(crate) fn set_window(&mut self, window: Option<u32>) {
+        self.window = window.map(|window| window as usize);
+    }
+
+    /// Windows, if it is drawn in such.
+    pub(crate) fn num_windows(&self) -> u32 {
+        self.window_side.map_or(0, |_| self.tiles.len() as u32)
+    }
+
+    /// Whether nothing was gathered yet in a tile, or what was goes.
+    pub(crate) fn is_first(&self, place: usize) -> bool {
+        self.window.is_some() || !self.tiles[place].has_light
+    }
+
+    /// The tiles that a part is drawn in.
+    fn places(&self) -> std::ops::Range<usize> {
+        self.window.map_or(0..self.tiles.len(), |window| window..window + 1)
     }
 
     /// Counts a part that has nothing to show.
     pub(crate) fn add_nothing(&mut self, jobs: &mut Jobs, kind: PartKind) -> u32 {
         jobs.begin(Some(self.shown.num_parts));
+        if let Some(window) = self.window {
+            self.tiles[window].has_light = false;
+        }
         self.shown.add(kind)
     }
 
@@ -157,22 +192,24 @@ impl Picture {
     ) -> Result<u32, Failure> {
         jobs.begin(Some(self.shown.num_parts));
         gpu.checked(|| {
-            for place in 0..self.tiles.len() {
+            for place in self.places() {
                 jobs.submit(gpu, |encoder, clock, slip| encode(encoder, clock, slip, (self, place)));
             }
         })?;
-        self.shown.has_light = true;
+        for place in self.places() {
+            self.tiles[place].has_light = true;
+        }
         Ok(self.shown.add(kind))
     }
 
     /// What ends a tile, as the shaders have it.
-    pub(crate) fn ended(&self, tile: Tile, origin: [u32; 2]) -> finish::Tile {
+    pub(crate) fn ended(&self, tile: &PictureTile, origin: [u32; 2]) -> finish::Tile {
         let [low, high] = self.shown.colors.unwrap_or(ANY_COLOR);
         finish::Tile {
-            size: tile.size,
+            size: tile.tile.size,
             origin,
             low,
-            has_light: self.shown.has_light.into(),
+            has_light: tile.has_light.into(),
             high,
             has_surfaces: (!self.surfaces.is_empty()).into(),
             background: self.view.background,
@@ -182,11 +219,11 @@ impl Picture {
 
     /// Whether nothing shows but the background.
     pub(crate) fn is_bare(&self) -> bool {
-        !self.shown.has_light && self.surfaces.is_empty()
+        self.surfaces.is_empty() && !self.tiles.iter().any(|tile| tile.has_light)
     }
 
     pub(crate) fn into_kept(self) -> Kept {
-        Kept { size: [self.view.width, self.view.height], tiles: self.tiles }
+        Kept { size: [self.view.width, self.view.height], window_side: self.window_side, tiles: self.tiles }
     }
 }
 
@@ -240,8 +277,11 @@ impl Finish {
             pixels.resize(num_pixels, picture.view.background);
         } else {
             jobs.begin(None);
-            for place in 0..picture.tiles.len() {
-                self.read_tile(gpu, jobs, (picture, place), &mut pixels)?;
+            let mut first = 0;
+            while first < picture.tiles.len() {
+                let batch = Batch::new(picture, first);
+                self.read_batch(gpu, jobs, (picture, &batch), &mut pixels)?;
+                first = batch.places.end;
             }
         }
         gpu.checked(|| gpu.wait())??;
@@ -254,15 +294,14 @@ impl Finish {
         })
     }
 
-    fn read_tile(
+    fn read_batch(
         &mut self,
         gpu: &Gpu,
         jobs: &mut Jobs,
-        (picture, place): (&Picture, usize),
+        (picture, batch): (&Picture, &Batch),
         pixels: &mut Vec<[f32; 3]>,
     ) -> Result<(), Failure> {
-        let PictureTile { tile, gathered } = &picture.tiles[place];
-        let bytes = tile.num_pixels() * PIXEL_BYTES;
+        let bytes = batch.bytes;
         let kept = self.buffers.take().filter(|[pixels, _]| pixels.size() >= bytes);
         let [shown, staging] = match kept {
             Some(buffers) => buffers,
@@ -278,24 +317,19 @@ impl Finish {
         };
         let (sender, receiver) = std::sync::mpsc::channel();
         gpu.checked(|| {
-            let ended = [picture.ended(*tile, [0, 0])];
-            let ended = buffer(gpu, Upload::Views, "volery finish tile", &ended, wgpu::BufferUsages::UNIFORM);
-            let bound = bind_group(gpu, &self.layout, finish::BINDINGS, |name| match name {
-                "tile" => ended.as_entire_binding(),
-                "gathered" => gathered.as_entire_binding(),
-                "surfaces" => wgpu::BindingResource::TextureView(picture.surfaces.of_tile(place)),
-                // A binding that the shader gains and this does not know fails as one of the wrong kind.
-                _ => shown.as_entire_binding(),
-            });
+            let bound: Vec<_> =
+                batch.tiles(picture).map(|tile| self.bind(gpu, picture, tile, &shown)).collect();
             jobs.submit(gpu, |encoder, clock, _| {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("volery finish"),
                     timestamp_writes: clock.compute(true, true),
                 });
                 pass.set_pipeline(&self.pipeline);
-                pass.set_bind_group(0, &bound, &[]);
-                let [x, y] = tile.size.map(|pixels| pixels.div_ceil(finish::GROUP));
-                pass.dispatch_workgroups(x, y, 1);
+                for (bound, (_, PictureTile { tile, .. }, _)) in bound.iter().zip(batch.tiles(picture)) {
+                    pass.set_bind_group(0, bound, &[]);
+                    let [x, y] = tile.size.map(|pixels| pixels.div_ceil(finish::GROUP));
+                    pass.dispatch_workgroups(x, y, 1);
+                }
                 drop(pass);
                 encoder.copy_buffer_to_buffer(&shown, 0, &staging, 0, bytes);
             });
@@ -307,11 +341,73 @@ impl Finish {
             _ => return Err(Failure::Other("the picture could not be read back".to_owned())),
         }
         let view = staging.get_mapped_range(..bytes).map_err(|e| Failure::Other(e.to_string()))?;
-        place_tile(pixels, picture.view.width as usize, *tile, bytemuck::cast_slice(&view));
+        for (_, PictureTile { tile, .. }, read) in batch.tiles(picture) {
+            let read = &view[read.start as usize..read.end as usize];
+            place_tile(pixels, picture.view.width as usize, *tile, bytemuck::cast_slice(read));
+        }
         drop(view);
         staging.unmap();
         self.buffers = Some([shown, staging]);
         Ok(())
+    }
+
+    /// What ends a tile binds.
+    fn bind(
+        &self,
+        gpu: &Gpu,
+        picture: &Picture,
+        (place, tile, range): (usize, &PictureTile, Range<u64>),
+        shown: &wgpu::Buffer,
+    ) -> wgpu::BindGroup {
+        let ended = [picture.ended(tile, [0, 0])];
+        let ended = buffer(gpu, Upload::Views, "volery finish tile", &ended, wgpu::BufferUsages::UNIFORM);
+        bind_group(gpu, &self.layout, finish::BINDINGS, |name| match name {
+            "tile" => ended.as_entire_binding(),
+            "gathered" => tile.gathered.as_entire_binding(),
+            "surfaces" => wgpu::BindingResource::TextureView(picture.surfaces.of_tile(place)),
+            // A binding that the shader gains and this does not know fails as one of the wrong kind.
+            _ => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer: shown,
+                offset: range.start,
+                size: std::num::NonZero::new(range.end - range.start),
+            }),
+        })
+    }
+}
+
+/// Tiles that are read at one time.
+struct Batch {
+    places: Range<usize>,
+    bytes: u64,
+}
+
+impl Batch {
+    /// As many from a tile on as are no larger together than the largest tile may be; at least that one.
+    fn new(picture: &Picture, first: usize) -> Self {
+        let (mut end, mut bytes) = (first, 0);
+        for tile in &picture.tiles[first..] {
+            let more = bytes + Self::bytes_of(tile);
+            if end > first && more > MAX_BATCH_BYTES {
+                break;
+            }
+            (end, bytes) = (end + 1, more);
+        }
+        Self { places: first..end, bytes }
+    }
+
+    /// The tiles, with their place in the picture and that of their bytes.
+    fn tiles<'a>(&self, picture: &'a Picture) -> impl Iterator<Item = (usize, &'a PictureTile, Range<u64>)> {
+        let mut start = 0;
+        self.places.clone().zip(&picture.tiles[self.places.clone()]).map(move |(place, tile)| {
+            let begin = start;
+            start += Self::bytes_of(tile);
+            (place, tile, begin..begin + tile.tile.num_pixels() * PIXEL_BYTES)
+        })
+    }
+
+    /// The bytes of a tile, up to where the next may begin.
+    fn bytes_of(tile: &PictureTile) -> u64 {
+        (tile.tile.num_pixels() * PIXEL_BYTES).next_multiple_of(BINDING_STEP)
     }
 }
 

@@ -108,7 +108,7 @@ impl Plane {
         let depths_per_length = pool.layout().spacing.max_element().recip();
         let number = picture.add(gpu, jobs, PartKind::default(), |encoder, clock, _, (picture, place)| {
             let tile = picture.tiles[place].tile;
-            let frame = shader_frame(picture, tile, content, (pool, &prepared.grid));
+            let frame = shader_frame((picture, place), content, (pool, &prepared.grid));
             gpu.count(Upload::Views, size_of_val(&frame));
             gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
             let tiles = buffer(
@@ -254,18 +254,17 @@ fn buffer<T: bytemuck::NoUninit>(gpu: &Gpu, kind: Upload, label: &str, contents:
 
 /// The shader's frame for a tile.
 fn shader_frame(
-    picture: &Picture,
-    tile: Tile,
+    (picture, place): (&Picture, usize),
     content: &Planes<'_>,
     (pool, grid): (&Pool, &BrickGrid),
 ) -> plane::Frame {
-    let layout = pool.layout();
+    let (layout, tile) = (pool.layout(), picture.tiles[place].tile);
     let is_scaled = layout.texel != TexelType::Rgba8 && pool.texels_per_unit() != 1.0;
     plane::Frame {
         cells: layout.cells.map(|n| n as f32),
         width: tile.size[0],
         height: tile.size[1],
-        is_first: picture.is_first().into(),
+        is_first: picture.is_first(place).into(),
         grid_dims: grid.dims(),
         brick_cells: layout.brick_cells as f32,
         bricks_per_cell: 1.0 / layout.brick_cells as f32,

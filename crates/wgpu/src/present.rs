@@ -46,7 +46,7 @@ impl Present {
         jobs.begin(None);
         gpu.checked(|| {
             for (place, tile) in picture.tiles.iter().enumerate() {
-                let ended = [picture.ended(tile.tile, tile.tile.first)];
+                let ended = [picture.ended(tile, tile.tile.first)];
                 let ended =
                     buffer(gpu, Upload::Views, "volery present tile", &ended, wgpu::BufferUsages::UNIFORM);
                 let bound = bind_group(gpu, &self.layout, present::BINDINGS, |name| match name {

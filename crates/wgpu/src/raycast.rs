@@ -122,8 +122,7 @@ impl Raycast {
         let form = Form { has_surfaces: !picture.surfaces.is_empty(), ..placed.choose(gpu, pool, rays) };
         let pipeline = self.pipeline(gpu, form)?;
         let number = picture.add(gpu, jobs, PartKind::RAYS, |encoder, clock, slip, (picture, place)| {
-            let frame =
-                shader_frame(picture, picture.tiles[place].tile, rays.transfer, (pool, &placed.units));
+            let frame = shader_frame((picture, place), rays.transfer, (pool, &placed.units));
             gpu.count(Upload::Views, size_of_val(&frame));
             gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
             let bound = self.bind(gpu, (&table, &placed, atlas), (picture, place), &slip.worst);

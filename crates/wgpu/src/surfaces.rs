@@ -103,16 +103,17 @@ impl Surfaces {
             self.held = None;
             self.held = Some(gpu.checked(|| Held::new(gpu, picture.meshes))?);
         }
+        // All as large as the first tile, which is as large as any, and as the depths.
+        let size = tiles[0].tile.size;
         let fits = |(textures, _): &(Vec<wgpu::Texture>, _)| {
-            let sizes = textures.iter().map(|texture| [texture.width(), texture.height()]);
-            sizes.eq(tiles.iter().map(|tile| tile.tile.size))
+            let mut sizes = textures.iter().map(|texture| [texture.width(), texture.height()]);
+            textures.len() == tiles.len() && sizes.all(|found| found == size)
         };
         let (textures, depth) = match self.targets.take().filter(fits) {
             Some(targets) => targets,
             None => gpu.checked(|| {
-                let textures = tiles.iter().map(|tile| texture(gpu, tile.tile.size, COLOR)).collect();
-                // The first tile is as large as any.
-                (textures, view_of(&texture(gpu, tiles[0].tile.size, DEPTH)))
+                let textures = tiles.iter().map(|_| texture(gpu, size, COLOR)).collect();
+                (textures, view_of(&texture(gpu, size, DEPTH)))
             })?,
         };
         let pipeline = match self.pipeline.take() {

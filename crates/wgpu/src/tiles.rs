@@ -109,7 +109,7 @@ impl Tiles {
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
         picture.add(gpu, jobs, kind, |encoder, clock, _, (picture, place)| {
             let bound = bind(picture, place);
-            let PictureTile { tile, gathered } = &picture.tiles[place];
+            let PictureTile { tile, gathered, .. } = &picture.tiles[place];
             let [width, height] = tile.size;
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("volery tile"),
@@ -129,7 +129,7 @@ impl Tiles {
             pass.set_scissor_rect(0, 0, width, height);
             encode(&mut pass, &bound);
             drop(pass);
-            let gathering = self.bind_gather(gpu, *tile, picture.is_first(), (&view, gathered));
+            let gathering = self.bind_gather(gpu, *tile, picture.is_first(place), (&view, gathered));
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some("volery gather"),
                 timestamp_writes: clock.compute(false, true),

@@ -39,12 +39,11 @@ fn rays_from(picture: &PictureView<'_>, tile: Tile, depth: f64) -> RayGrid {
 
 /// The shader's frame for a tile.
 pub(crate) fn shader_frame(
-    picture: &Picture,
-    tile: Tile,
+    (picture, place): (&Picture, usize),
     transfer: &RayTransfer,
     (pool, units): (&Pool, &Units),
 ) -> raycast::Frame {
-    let layout = pool.layout();
+    let (layout, tile) = (pool.layout(), picture.tiles[place].tile);
     let start_depth = start_depth(&picture.view, layout);
     let rays = rays_from(&picture.view, tile, start_depth);
     let in_cells = |v: DVec3| (v / layout.spacing).as_vec3().to_array();
@@ -61,7 +60,7 @@ pub(crate) fn shader_frame(
         origin_dx: in_cells(rays.origin_dx),
         height: tile.size[1],
         origin_dy: in_cells(rays.origin_dy),
-        is_first: picture.is_first().into(),
+        is_first: picture.is_first(place).into(),
         toward: direction(rays.toward),
         unit_cells: units.unit_cells as f32,
         toward_dx: direction(rays.toward_dx),

@@ -239,6 +239,14 @@ impl Backend for Narrow {
         Ok(())
     }
 
+    fn begin_windows(&mut self, view: &PictureView<'_>, _: u32) -> Result<(), DrawError> {
+        self.begin(view)
+    }
+
+    fn draw_window(&mut self, content: &Content<'_>, _: u32) -> Result<u32, DrawError> {
+        self.draw_part(content)
+    }
+
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
         let bricks = self.bricks.lock().unwrap();
         for brick in content.bricks() {
