@@ -75,8 +75,9 @@ macro_rules! hand_on {
             &mut $this,
             content: &::volery_frame::Content<'_>,
             window: u32,
+            stride: u32,
         ) -> Result<u32, ::volery_frame::DrawError> {
-            $to.draw_window(content, window)
+            $to.draw_window(content, window, stride)
         }
     };
     (@draw_part $this:ident, $to:expr) => {

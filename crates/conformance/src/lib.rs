@@ -222,6 +222,7 @@ properties! { $
         pictures_are_begun_and_ended;
     windows:
         windows_show_their_content_alone
+        strides_show_some_rays_of_the_picture
         windows_that_are_none_are_refused;
 }
 

@@ -1,6 +1,6 @@
 //! Pictures in windows: each shows the content that was drawn in it last, and that alone.
 
-use volery_frame::backend::{MAX_WINDOW_SIDE, WINDOW_STEP};
+use volery_frame::backend::{MAX_STRIDE, MAX_WINDOW_SIDE, WINDOW_STEP};
 use volery_frame::{Backend, Content, DrawError, Image};
 
 use super::oracle::assert_shows_something;
@@ -50,7 +50,7 @@ pub fn windows_show_their_content_alone(backend: &mut dyn Backend) {
             let mut parts = 0;
             let mut draw = |content: &Content<'_>, wanted: &[Shown]| {
                 for (window, _) in (0..num).zip(&shown).filter(|(_, shown)| wanted.contains(shown)).rev() {
-                    assert_eq!(backend.draw_window(content, window), Ok(parts), "the number of a part");
+                    assert_eq!(backend.draw_window(content, window, 1), Ok(parts), "the number of a part");
                     parts += 1;
                 }
             };
@@ -67,27 +67,75 @@ pub fn windows_show_their_content_alone(backend: &mut dyn Backend) {
     }
 }
 
+/// Squares of a window show the ray of their middle pixel, whatever the stride of other windows.
+pub fn strides_show_some_rays_of_the_picture(backend: &mut dyn Backend) {
+    let world = World::new(backend, false);
+    let (content, view) = (world.whole(Kind::Rays), world.view(&[]));
+    let whole = world.draw(backend, &[], content).image;
+    let across = SIZE[0].div_ceil(WINDOW_STEP);
+    let num = across * SIZE[1].div_ceil(WINDOW_STEP);
+    let stride_of = |window: u32| 1 << (window % 4);
+    backend.begin_windows(&view, WINDOW_STEP).expect("the suite's pictures are small");
+    for window in 0..num {
+        // What was drawn before with another stride is gone.
+        for stride in [MAX_STRIDE / stride_of(window), stride_of(window)] {
+            backend.draw_window(&content, window, stride).expect("the suite's windows are right");
+        }
+    }
+    let drawn = backend.finish().expect("a picture was begun");
+    let mut expected = drawn.image.clone();
+    let [width, height] = SIZE;
+    let mut num_shared = 0;
+    for (place, pixel) in (0..).zip(&mut expected.pixels) {
+        let at = [place % width, place / width];
+        let stride = stride_of(at[1] / WINDOW_STEP * across + at[0] / WINDOW_STEP);
+        let [x, y] = at.map(|place| place / stride * stride + stride / 2);
+        // Beyond the edge of the picture nobody knows.
+        if x < width && y < height {
+            *pixel = whole.pixels[(y * width + x) as usize];
+            num_shared += u32::from(stride > 1);
+        }
+    }
+    assert!(num_shared > width * height / 2, "{num_shared} pixels share rays");
+    assert_like("windows of several strides", &drawn.image, &expected, MAX_RMSE);
+    assert!(drawn.ray_doubt.is_some(), "a doubt");
+    backend.begin_windows(&view, WINDOW_STEP).expect("the suite's pictures are small");
+    for (content, stride) in
+        [(content, 0), (content, 3), (content, 2 * MAX_STRIDE), (world.whole(Kind::Planes), 2)]
+    {
+        let found = backend.draw_window(&content, 0, stride);
+        assert!(
+            matches!(found, Err(DrawError::Window { found, .. }) if found == stride),
+            "{stride}: {found:?}"
+        );
+    }
+}
+
 /// Windows that there are not are refused and change nothing.
 pub fn windows_that_are_none_are_refused(backend: &mut dyn Backend) {
     let world = World::new(backend, false);
     let (content, view) = (world.whole(Kind::Rays), world.view(&[]));
-    assert_eq!(backend.draw_window(&content, 0), Err(DrawError::NoPicture), "a window without a beginning");
+    assert_eq!(
+        backend.draw_window(&content, 0, 1),
+        Err(DrawError::NoPicture),
+        "a window without a beginning"
+    );
     for side in [0, 1, WINDOW_STEP + 1, MAX_WINDOW_SIDE + WINDOW_STEP, u32::MAX] {
         let found = backend.begin_windows(&view, side);
         assert!(matches!(found, Err(DrawError::Window { found, .. }) if found == side), "{side}: {found:?}");
         assert_eq!(backend.finish().err(), Some(DrawError::NoPicture), "an end after a side of {side}");
     }
     backend.begin(&view).expect("the suite's pictures are small");
-    let found = backend.draw_window(&content, 0);
+    let found = backend.draw_window(&content, 0, 1);
     assert!(matches!(found, Err(DrawError::Window { .. })), "a window of a whole picture: {found:?}");
     assert_eq!(backend.draw_part(&content), Ok(0), "a part after a window that was refused");
     let whole = backend.finish().expect("a picture was begun").image;
     let num = SIZE.map(|pixels| pixels.div_ceil(WINDOW_STEP)).iter().product::<u32>();
     backend.begin_windows(&view, WINDOW_STEP).expect("the suite's pictures are small");
     for window in 0..num {
-        backend.draw_window(&content, window).expect("the suite's windows are right");
+        backend.draw_window(&content, window, 1).expect("the suite's windows are right");
     }
-    let found = backend.draw_window(&content, num);
+    let found = backend.draw_window(&content, num, 1);
     assert!(matches!(found, Err(DrawError::Window { found, .. }) if found == num), "{found:?}");
     let drawn = backend.finish().expect("a picture was begun").image;
     assert_like("after a window that was refused", &drawn, &whole, MAX_RMSE);

@@ -230,6 +230,22 @@ pub fn check_windows(view: &PictureView<'_>, side: u32) -> Result<u32, DrawError
     Ok(view.width.div_ceil(side) * view.height.div_ceil(side))
 }
 
+/// The most pixels per axis that may share a ray in a window.
+pub const MAX_STRIDE: u32 = 8;
+
+/// A check that every backend makes before it draws in a window.
+///
+/// # Errors
+/// [`DrawError::Window`].
+pub fn check_stride(content: &Content<'_>, stride: u32) -> Result<(), DrawError> {
+    let max = if matches!(content, Content::Rays(_)) { MAX_STRIDE } else { 1 };
+    if stride.is_power_of_two() && stride <= max {
+        return Ok(());
+    }
+    let expected = if max == 1 { "1 for what is no rays".to_owned() } else { "1, 2, 4 or 8".to_owned() };
+    Err(DrawError::Window { what: "the stride", found: stride, expected })
+}
+
 /// A check that every backend makes before it draws a window, of which a picture has so many.
 ///
 /// # Errors
@@ -294,9 +310,12 @@ pub trait Backend: Send {
     /// Shows content alone in a window, in place of what was there, and returns the number of the part. A window can so be
     /// drawn better when there is time left. Need not wait until the device has drawn it.
     ///
+    /// With a stride of 2, 4 or 8 ([`MAX_STRIDE`]) squares of so many pixels a side share the ray of their pixel
+    /// `(stride / 2, stride / 2)`: of rays alone. Surfaces are behind in every pixel.
+    ///
     /// # Errors
-    /// As [`Backend::draw_part`], and [`DrawError::Window`] when there is no such window.
-    fn draw_window(&mut self, content: &Content<'_>, window: u32) -> Result<u32, DrawError>;
+    /// As [`Backend::draw_part`], and [`DrawError::Window`] when there is no such window or stride.
+    fn draw_window(&mut self, content: &Content<'_>, window: u32, stride: u32) -> Result<u32, DrawError>;
 
     /// Adds what comes next to the picture, behind all that it shows, and returns the number of the part: parts count
     /// from 0. Need not wait until the device has drawn it.

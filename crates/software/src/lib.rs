@@ -61,7 +61,7 @@ mod walk;
 use std::time::Instant;
 
 use fearless_simd::Level;
-use volery_frame::backend::{check_content, check_view, check_window, check_windows};
+use volery_frame::backend::{check_content, check_stride, check_view, check_window, check_windows};
 use volery_frame::{
     Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, Frame, PictureView,
     Revision, UploadError, UploadedBytes, VolumeLayout,
@@ -236,11 +236,12 @@ impl Backend for SoftwareBackend {
         checked.map(drop)
     }
 
-    fn draw_window(&mut self, content: &Content<'_>, window: u32) -> Result<u32, DrawError> {
+    fn draw_window(&mut self, content: &Content<'_>, window: u32, stride: u32) -> Result<u32, DrawError> {
         let picture = self.picture.as_mut().ok_or(DrawError::NoPicture)?;
         let num_windows = picture.window_side.map_or(Ok(0), |side| check_windows(&picture.view, side))?;
         check_window(window, num_windows)?;
-        picture.window = Some(window);
+        check_stride(content, stride)?;
+        (picture.window, picture.stride) = (Some(window), stride);
         let number = self.draw_some(content, true);
         if let Some(picture) = &mut self.picture {
             picture.window = None;

@@ -41,22 +41,22 @@ pub(crate) struct Span<S: Simd> {
 }
 
 impl<S: Simd> Packet<S> {
-    /// The rays of the packet whose upper left pixel is `(column, row)`, to where surfaces are. Pixels outside the
-    /// picture are as good as others. Rays in the volume's faces run inside of it.
+    /// The rays of the packet whose upper left pixel is `(column, row)`, to where surfaces are: of every pixel, or of the
+    /// middle ones of squares of `stride` pixels. Pixels outside the picture are as good as others. Rays in the volume's faces run inside of it.
     #[inline(always)]
     pub(crate) fn new(
         simd: S,
         (rays, surfaces): (&RayGrid, &Surfaces),
         layout: &VolumeLayout,
         unit_length: f64,
-        column: u32,
-        row: u32,
+        ([column, row], stride): ([u32; 2], u32),
     ) -> Self {
         let mut origin = [[0.0_f64; 16]; 3];
         let mut direction = [[0.0_f64; 16]; 3];
         let mut end = [f64::INFINITY; 16];
         for lane in 0..16 {
-            let [column, row] = [column + lane % PACKET, row + lane / PACKET];
+            let [x, y] = [lane % PACKET, lane / PACKET].map(|place| place * stride + stride / 2);
+            let [column, row] = [column + x, row + y];
             let ray = rays.pixel(column, row);
             end[lane as usize] = surfaces.distance(column, row) / unit_length;
             let o = ray.origin / layout.spacing;

@@ -49,6 +49,8 @@ pub(crate) struct Target {
     /// Pixels of a window per axis, if it is drawn in windows; and the one that is drawn now.
     pub(crate) window_side: Option<u32>,
     pub(crate) window: Option<u32>,
+    /// Pixels per axis that share a ray in it.
+    pub(crate) stride: u32,
 }
 
 /// What the parts so far were.
@@ -63,13 +65,18 @@ pub(crate) struct Shown {
 }
 
 /// What the pixels of a tile have gathered; none where nothing was.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Tile {
+    /// Pixels per axis that share a ray. The first packets of the first rows hold them, as if the tile were so much
+    /// smaller.
+    pub(crate) stride: u32,
     light: Option<Box<[Light; NUM_PACKETS]>>,
     doubts: Option<Box<[Doubt; NUM_PACKETS]>>,
 }
 
 impl Tile {
+    const EMPTY: Self = Self { stride: 1, light: None, doubts: None };
+
     /// Packets row by row.
     #[inline]
     pub(crate) fn light(&mut self) -> &mut [Light; NUM_PACKETS] {
@@ -79,7 +86,7 @@ impl Tile {
     #[inline]
     pub(crate) fn light_and_doubts(&mut self) -> (&mut [Light; NUM_PACKETS], &mut [Doubt; NUM_PACKETS]) {
         self.light();
-        let Self { light, doubts } = self;
+        let Self { light, doubts, .. } = self;
         let light = light.get_or_insert_with(|| Box::new([[[0.0; 16]; 4]; NUM_PACKETS]));
         (light, doubts.get_or_insert_with(|| Box::new([[[0.0; 16]; 3]; NUM_PACKETS])))
     }
@@ -139,10 +146,11 @@ impl Target {
         Self {
             view: PictureView { meshes: &[], ..*view },
             surfaces: Surfaces::new(view),
-            tiles: std::iter::repeat_with(Tile::default).take(num_tiles).collect(),
+            tiles: std::iter::repeat_with(|| Tile::EMPTY).take(num_tiles).collect(),
             shown: Shown::default(),
             window_side: None,
             window: None,
+            stride: 1,
         }
     }
 
@@ -162,12 +170,13 @@ impl Target {
         let [[x0, y0], [x1, y1]] = self.tile_range();
         let is_drawn =
             |index: u32| (x0..=x1).contains(&(index % columns)) && (y0..=y1).contains(&(index / columns));
-        let is_window = self.window.is_some();
+        let (is_window, stride) = (self.window.is_some(), self.stride);
         let Self { surfaces, tiles, .. } = self;
         let tiles: Vec<_> = (0..).zip(tiles).filter(|(index, _)| is_drawn(*index)).collect();
         tiles.into_par_iter().for_each(|(index, tile)| {
             if is_window {
                 tile.clear();
+                tile.stride = stride;
             }
             draw(surfaces, index, [index % columns * TILE, index / columns * TILE], tile);
         });
@@ -210,6 +219,15 @@ impl Target {
                     *pixel = self.surfaces.color(column, row);
                 }
                 let Some(light) = &tile.light else { continue };
+                if tile.stride > 1 {
+                    for (column, pixel) in (0..).zip(pixels) {
+                        let [x, y] = [column, row % TILE].map(|place| place / tile.stride);
+                        let packet = &light[(y / PACKET * TILE_PACKETS + x / PACKET) as usize];
+                        let lane = (y % PACKET * PACKET + x % PACKET) as usize;
+                        *pixel = self.shown.over([0, 1, 2, 3].map(|i| packet[i][lane]), *pixel);
+                    }
+                    continue;
+                }
                 let packets = &light[packet_row as usize..(packet_row + TILE_PACKETS) as usize];
                 for (packet, pixels) in packets.iter().zip(pixels.chunks_mut(PACKET as usize)) {
                     for (lane, pixel) in (lane_row..).zip(pixels) {

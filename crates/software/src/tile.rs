@@ -186,10 +186,13 @@ fn draw_tile<S: Simd, T: Texel>(simd: S, shared: &Shared<'_, T>, first: [u32; 2]
     if drawables.is_empty() {
         return;
     }
+    let stride = tile.stride;
     let (light, doubts) = tile.light_and_doubts();
     for (packet, gathered) in (0..).zip(light.iter_mut().zip(doubts)) {
-        let [x, y] = [packet % TILE_PACKETS, packet / TILE_PACKETS].map(|place| place * PACKET);
-        draw_packet(simd, shared, &drawables, [first[0] + x, first[1] + y], gathered);
+        let [x, y] = [packet % TILE_PACKETS, packet / TILE_PACKETS].map(|place| place * PACKET * stride);
+        if x.max(y) < TILE {
+            draw_packet(simd, shared, &drawables, ([first[0] + x, first[1] + y], stride), gathered);
+        }
     }
 }
 
@@ -198,12 +201,12 @@ fn draw_packet<S: Simd, T: Texel>(
     simd: S,
     shared: &Shared<'_, T>,
     drawables: &[&Drawable<'_, T>],
-    [column, row]: [u32; 2],
+    at: ([u32; 2], u32),
     (gathered, doubts): (&mut target::Light, &mut target::Doubt),
 ) {
     let unit_length = shared.unit_length;
     let rays = (&shared.rays, shared.surfaces);
-    let packet = Packet::new(simd, rays, shared.layout, unit_length, column, row);
+    let packet = Packet::new(simd, rays, shared.layout, unit_length, at);
     let mut light = Light {
         color: axes(
             #[inline(always)]

@@ -1,6 +1,6 @@
 //! The backend: one volume's bricks, and what of the last frame can be used again.
 
-use volery_frame::backend::{check_content, check_view, check_window, check_windows};
+use volery_frame::backend::{check_content, check_stride, check_view, check_window, check_windows};
 use volery_frame::{
     Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, PictureView,
     Revision, UploadError, UploadedBytes, VolumeLayout,
@@ -169,18 +169,19 @@ impl WgpuBackend {
     }
 
     /// Draws a part of the whole picture or in one window.
-    fn draw_some(&mut self, content: &Content<'_>, window: Option<u32>) -> Result<u32, DrawError> {
-        let picture = self.picture.as_mut().ok_or(DrawError::NoPicture)?;
-        if let Some(window) = window {
+    fn draw_some(&mut self, content: &Content<'_>, window: Option<(u32, u32)>) -> Result<u32, DrawError> {
+        let picture = self.picture.as_ref().ok_or(DrawError::NoPicture)?;
+        if let Some((window, stride)) = window {
             check_window(window, picture.num_windows())?;
+            check_stride(content, stride)?;
         }
-        picture.set_window(window);
         check_content(content, self.pool.as_ref().map(Pool::layout))?;
         if let Some(brick) = content.bricks().find(|brick| !self.is_resident(brick.id)) {
             return Err(DrawError::NotResident { id: brick.id });
         }
         // A picture in which the device failed is dropped.
         let mut picture = self.picture.take().ok_or(DrawError::NoPicture)?;
+        picture.set_window(window);
         let number = self.add(&mut picture, content).map_err(device)?;
         self.picture = Some(picture);
         Ok(number)
@@ -242,8 +243,8 @@ impl Backend for WgpuBackend {
         self.draw_some(content, None)
     }
 
-    fn draw_window(&mut self, content: &Content<'_>, window: u32) -> Result<u32, DrawError> {
-        self.draw_some(content, Some(window))
+    fn draw_window(&mut self, content: &Content<'_>, window: u32, stride: u32) -> Result<u32, DrawError> {
+        self.draw_some(content, Some((window, stride)))
     }
 
     fn finished(&mut self) -> Vec<FinishedPart> {

@@ -67,6 +67,8 @@ pub(crate) struct PictureTile {
     pub(crate) gathered: wgpu::Buffer,
     /// Whether a part went to the device, so that it holds something.
     has_light: bool,
+    /// Pixels per axis that share a ray.
+    pub(crate) stride: u32,
 }
 
 /// Tiles that the next picture of that size can take over.
@@ -130,6 +132,7 @@ impl Kept {
                     mapped_at_creation: false,
                 }),
                 has_light: false,
+                stride: 1,
             };
             Tile::of_picture(size, window_side.unwrap_or_else(whole)).map(tile).collect()
         })?;
@@ -149,13 +152,18 @@ impl Picture {
     pub(crate) fn new(view: &PictureView<'_>, kept: Kept, surfaces: PictureSurfaces) -> Self {
         let view = PictureView { meshes: &[], ..*view };
         let Kept { window_side, mut tiles, .. } = kept;
-        tiles.iter_mut().for_each(|tile| tile.has_light = false);
+        for tile in &mut tiles {
+            (tile.has_light, tile.stride) = (false, 1);
+        }
         Self { view, surfaces, tiles, window_side, window: None, shown: Shown::default() }
     }
 
-    /// Draws one window alone from now on, or all.
-    pub(crate) fn set_window(&mut self, window: Option<u32>) {
-        self.window = window.map(|window| window as usize);
+    /// Draws one window alone from now on, with a stride, or all.
+    pub(crate) fn set_window(&mut self, window: Option<(u32, u32)>) {
+        self.window = window.map(|(window, _)| window as usize);
+        if let Some((window, stride)) = window {
+            self.tiles[window as usize].stride = stride;
+        }
     }
 
     /// Windows, if it is drawn in such.
@@ -213,6 +221,7 @@ impl Picture {
             high,
             has_surfaces: (!self.surfaces.is_empty()).into(),
             background: self.view.background,
+            stride: tile.stride,
             ..bytemuck::Zeroable::zeroed()
         }
     }

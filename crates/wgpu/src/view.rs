@@ -5,7 +5,7 @@ use volery_frame::{PictureView, RayTransfer, VolumeLayout};
 use volery_scene::RayGrid;
 use volery_shaders::raycast;
 
-use crate::picture::{Picture, Tile};
+use crate::picture::{Picture, PictureTile, Tile};
 use crate::pool::Pool;
 use crate::units::Units;
 
@@ -19,14 +19,20 @@ fn start_depth(picture: &PictureView<'_>, layout: &VolumeLayout) -> f64 {
     (nearest - picture.camera.eye).dot(forward).max(0.0)
 }
 
-/// The rays of a tile that start at a depth.
-fn rays_from(picture: &PictureView<'_>, tile: Tile, depth: f64) -> RayGrid {
+/// The rays of a tile that start at a depth, one for squares of so many pixels.
+fn rays_from(picture: &PictureView<'_>, tile: Tile, stride: u32, depth: f64) -> RayGrid {
     let rays = picture.camera.rays(picture.width, picture.height);
-    let [column, row] = tile.first.map(f64::from);
+    let step = f64::from(stride);
+    // The middle of the pixel `stride / 2`, in place of the middle of the square.
+    let shift = f64::from(stride / 2) + 0.5 - 0.5 * step;
+    let [column, row] = tile.first.map(|pixel| f64::from(pixel) + shift);
     let rays = RayGrid {
         origin: rays.origin + rays.origin_dx * column + rays.origin_dy * row,
         toward: rays.toward + rays.toward_dx * column + rays.toward_dy * row,
-        ..rays
+        origin_dx: rays.origin_dx * step,
+        origin_dy: rays.origin_dy * step,
+        toward_dx: rays.toward_dx * step,
+        toward_dy: rays.toward_dy * step,
     };
     // The directions' part along `forward` is 1, so a depth is a factor.
     RayGrid {
@@ -43,9 +49,10 @@ pub(crate) fn shader_frame(
     transfer: &RayTransfer,
     (pool, units): (&Pool, &Units),
 ) -> raycast::Frame {
-    let (layout, tile) = (pool.layout(), picture.tiles[place].tile);
+    let layout = pool.layout();
+    let PictureTile { tile, stride, .. } = picture.tiles[place];
     let start_depth = start_depth(&picture.view, layout);
-    let rays = rays_from(&picture.view, tile, start_depth);
+    let rays = rays_from(&picture.view, tile, stride, start_depth);
     let in_cells = |v: DVec3| (v / layout.spacing).as_vec3().to_array();
     // Directions are only directions: of any length, so of one that f32 holds.
     let longest = rays.toward.length().max(f64::MIN_POSITIVE);
@@ -56,9 +63,9 @@ pub(crate) fn shader_frame(
     let texels_per_step = pool.texels_per_unit();
     raycast::Frame {
         origin: in_cells(rays.origin),
-        width: tile.size[0],
+        width: tile.size[0].div_ceil(stride),
         origin_dx: in_cells(rays.origin_dx),
-        height: tile.size[1],
+        height: tile.size[1].div_ceil(stride),
         origin_dy: in_cells(rays.origin_dy),
         is_first: picture.is_first(place).into(),
         toward: direction(rays.toward),
@@ -88,6 +95,8 @@ pub(crate) fn shader_frame(
         flat_rounding: transfer.flat_rounding() as f32,
         surface_offset: (picture.surfaces.zero_depth() - start_depth) as f32,
         cells_per_depth: (longest / spacing) as f32,
+        stride,
+        last_pixel: tile.size.map(|pixels| pixels - 1),
         ..bytemuck::Zeroable::zeroed()
     }
 }

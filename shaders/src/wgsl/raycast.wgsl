@@ -64,6 +64,9 @@ struct Frame {
     // direction of length 1 as the frame has it.
     surface_offset: f32,
     cells_per_depth: f32,
+    // Pixels per axis that share a ray, that of the pixel after so many halves; and the last pixel of the tile.
+    stride: u32,
+    last_pixel: vec2u,
 }
 
 // Whether texels may be blank.
@@ -214,7 +217,8 @@ fn ray_of_pixel(pixel: vec2u) -> Ray {
     let depth_per_t = length(direction * frame.depth_per_cell);
     var end = FAR;
     if HAS_SURFACES {
-        let depth = textureLoad(surfaces, pixel, 0).a;
+        let place = min(pixel * frame.stride + frame.stride / 2u, frame.last_pixel);
+        let depth = textureLoad(surfaces, place, 0).a;
         end = (depth + frame.surface_offset) * frame.cells_per_depth * length(way);
     }
     let motion = select(direction, vec3f(0.0), is_still);

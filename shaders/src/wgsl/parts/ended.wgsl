@@ -13,6 +13,8 @@ struct Tile {
     has_surfaces: u32,
     // What is behind where there are no surfaces.
     background: vec3f,
+    // Pixels per axis that share what was gathered.
+    stride: u32,
 }
 
 @group(0) @binding(0) var<uniform> tile: Tile;
@@ -30,6 +32,7 @@ fn color_of(pixel: vec2u) -> vec3f {
     if tile.has_light == 0u {
         return behind;
     }
-    let light = gathered[pixel.y * tile.size.x + pixel.x];
+    let place = pixel / tile.stride;
+    let light = gathered[place.y * ((tile.size.x + tile.stride - 1u) / tile.stride) + place.x];
     return clamp(light.rgb + light.a * behind, min(tile.low, behind), max(tile.high, behind));
 }

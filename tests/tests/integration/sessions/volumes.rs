@@ -243,7 +243,7 @@ impl Backend for Narrow {
         self.begin(view)
     }
 
-    fn draw_window(&mut self, content: &Content<'_>, _: u32) -> Result<u32, DrawError> {
+    fn draw_window(&mut self, content: &Content<'_>, _: u32, _: u32) -> Result<u32, DrawError> {
         self.draw_part(content)
     }
 
