@@ -28,6 +28,7 @@ pub mod histogram;
 pub mod info;
 mod input;
 pub mod output;
+mod path;
 mod ray_budget;
 pub mod report;
 pub mod residency;
@@ -45,11 +46,14 @@ pub use data::{
 pub use histogram::Histogram;
 pub use info::{GridInfo, Info, StackInfo};
 pub use input::{Input, InputData, InputError, InputOptions, InputPlan, read_input};
+pub use path::Path;
 pub use report::Report;
 pub use session::{Picture, Refinements, RenderError, Session, VerifyError};
 pub use technique::planes::{Progressive, Step};
 pub use transfer::{ColorMap, Preset};
-pub use view::{BACKGROUND, Dial, Focus, How, PlaneView, Slicing, StackView, Transfer, View, ViewOptions};
+pub use view::{
+    BACKGROUND, Deadline, Dial, Focus, How, PlaneView, Slicing, StackView, Transfer, View, ViewOptions,
+};
 
 pub use glam;
 pub use volery_frame::{Backend, Device, DeviceKind, Image, Sampling, Thickness};

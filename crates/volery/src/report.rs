@@ -164,6 +164,30 @@ pub struct Seconds {
 pub struct Frame {
     /// All of it.
     pub seconds: f64,
+    /// Of one with a deadline.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub paced: Option<PacedFrame>,
+}
+
+/// How a frame was drawn by a deadline.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PacedFrame {
+    /// What it was asked to take.
+    pub budget_seconds: f64,
+    /// What it was expected to take when its parts were chosen.
+    pub predicted_seconds: f64,
+    /// Spent on decisions.
+    pub control_seconds: f64,
+    /// Parts that were drawn.
+    pub parts: usize,
+    /// Those among them that drew something again, finer.
+    pub refinements: usize,
+    /// Share of the pixels that have a ray or sample of their own.
+    pub rays_per_pixel: f64,
+    /// Level of detail of the data: 0 is the finest.
+    pub rung: usize,
+    /// Whether nothing could be drawn more coarsely.
+    pub is_at_floor: bool,
 }
 
 /// How much there was to do.
@@ -203,6 +227,12 @@ pub struct Dial {
     /// Largest difference of a colour channel from the full resolution.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
+    /// Milliseconds until the picture was to be there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget_ms: Option<f64>,
+    /// Where somebody looked, as shares of the picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaze: Option<[f64; 2]>,
     /// Of a focus: how many of its diagonals away a node may be drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<f64>,

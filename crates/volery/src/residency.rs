@@ -69,6 +69,50 @@ pub(crate) fn upload(
     }
 }
 
+/// Bytes of texels of the nodes whose bricks are not resident, were all bricks whole.
+pub(crate) fn missing_bytes(
+    source: &dyn NodeSource,
+    store: &Store,
+    nodes: &[Node],
+    backend: &dyn Backend,
+) -> u64 {
+    let missing = missing(source.layout(), store, nodes, backend).count();
+    missing as u64 * brick_bytes(source, store)
+}
+
+/// Makes the first of these bricks resident that are not, of so many bytes together. A backend that has no room for them
+/// goes without.
+pub(crate) fn prefetch(
+    source: &dyn NodeSource,
+    store: &Store,
+    nodes: &[Node],
+    max_bytes: u64,
+    backend: &mut dyn Backend,
+) -> Result<Uploaded, Error> {
+    let num = (max_bytes / brick_bytes(source, store)) as usize;
+    let nodes: Vec<Node> = missing(source.layout(), store, nodes, backend).take(num).collect();
+    match upload_missing(source, &store.encoding, &nodes, backend) {
+        Err(Error::Upload(UploadError::PoolFull { .. })) => Ok(Uploaded::default()),
+        other => other,
+    }
+}
+
+fn missing<'a>(
+    layout: &'a Layout,
+    store: &Store,
+    nodes: &'a [Node],
+    backend: &'a dyn Backend,
+) -> impl Iterator<Item = Node> + 'a {
+    let numbers = Numbers::of(layout);
+    let is_held = backend.volume() == Some(store.layout.revision);
+    nodes.iter().copied().filter(move |&node| !is_held || !backend.is_resident(numbers.id(layout, node)))
+}
+
+fn brick_bytes(source: &dyn NodeSource, store: &Store) -> u64 {
+    let samples = (source.layout().brick_cells() + 1).pow(3);
+    (samples * store.encoding.texel.bytes()) as u64
+}
+
 /// Has the backend forget the bricks of all nodes but these.
 fn evict_others(layout: &Layout, nodes: &[Node], backend: &mut dyn Backend) {
     let needed: HashSet<Node> = nodes.iter().copied().collect();

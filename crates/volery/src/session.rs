@@ -4,6 +4,7 @@
 //! once. After that a new camera, transfer function, technique or dial costs what it changes: bricks that a backend
 //! holds stay, tables are made again only of another transfer function.
 
+mod deadline;
 mod error;
 mod refine;
 mod times;
@@ -41,12 +42,15 @@ pub struct Session<D> {
     data: D,
     /// Each with the seconds that it took to make ready.
     techniques: Vec<(Box<dyn Technique<D>>, Option<f64>)>,
+    /// What was learned by pictures with deadlines.
+    pace: Option<deadline::Pace>,
 }
 
 impl<D: Data> Session<D> {
     /// Of data that are ready.
     pub fn new(data: D) -> Self {
-        Self { data, techniques: D::techniques().into_iter().map(|technique| (technique, None)).collect() }
+        let techniques = D::techniques().into_iter().map(|technique| (technique, None)).collect();
+        Self { data, techniques, pace: None }
     }
 
     /// What is drawn.
@@ -113,9 +117,26 @@ impl<D: Data> Session<D> {
         let mut times = Vec::with_capacity(num_frames);
         let mut uploaded = Uploaded::default();
         let mut last: Option<(Plan, Drawn)> = None;
+        let mut is_full = true;
         for _ in 0..num_frames {
             // A plan shares what the technique may change for the next.
             drop(last.take());
+            if let Dial::Deadline(deadline) = view.dial {
+                let start = Instant::now();
+                let paced = self.draw_by(view, deadline, place, backend)?;
+                uploaded += paced.uploaded;
+                let draw = start.elapsed().as_secs_f64();
+                times.push(Times {
+                    select: 0.0,
+                    geometry: None,
+                    upload: None,
+                    draw,
+                    paced: Some(paced.frame),
+                });
+                is_full = paced.is_full;
+                last = Some((paced.plan, paced.drawn));
+                continue;
+            }
             let technique = &mut self.techniques[place].0;
             if num_frames > 1 {
                 technique.forget_view();
@@ -129,10 +150,14 @@ impl<D: Data> Session<D> {
             let upload = plan.store.is_some().then(|| start.elapsed().as_secs_f64());
             let start = Instant::now();
             let drawn = self.draw(view, &plan, backend)?;
-            times.push(Times { select, geometry, upload, draw: start.elapsed().as_secs_f64() });
+            times.push(Times { select, geometry, upload, draw: start.elapsed().as_secs_f64(), paced: None });
             last = Some((plan, drawn));
         }
-        let (plan, drawn) = last.ok_or(RenderError::NoFrame)?;
+        let (mut plan, mut drawn) = last.ok_or(RenderError::NoFrame)?;
+        if !is_full {
+            // What is known of drawings in full says nothing of this picture.
+            (plan.bound_max, drawn.ray_doubt) = (None, None);
+        }
         Ok(self.picture(view, plan, drawn, (uploaded, &times), backend))
     }
 
@@ -203,9 +228,12 @@ impl<D: Data> Session<D> {
         let built = self.techniques.iter().find(|(technique, _)| technique.draws(&view.how));
         let built = built.and_then(|(_, seconds)| *seconds).unwrap_or(0.0);
         let focus = if let How::Planes(planes) = &view.how { planes.focus } else { None };
+        let deadline = if let Dial::Deadline(deadline) = view.dial { Some(deadline) } else { None };
         let dial = report::Dial {
             tolerance: if let Dial::Tolerance(tolerance) = view.dial { Some(tolerance) } else { None },
             error: if let Dial::Error(error) = view.dial { Some(error) } else { None },
+            budget_ms: deadline.map(|deadline| 1e3 * deadline.budget_secs),
+            gaze: deadline.and_then(|deadline| deadline.gaze),
             quality: focus.map(|focus| focus.quality),
         };
         let error = error_of(&plan, &drawn);

@@ -50,6 +50,17 @@ pub enum Dial {
     Tolerance(f64),
     /// The largest difference of any colour channel from the full resolution, in [0, 1].
     Error(f64),
+    /// As much as is needed for the picture to be there in time.
+    Deadline(Deadline),
+}
+
+/// When a picture must be there, and what of it matters most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deadline {
+    /// Seconds from the call to the picture.
+    pub budget_secs: f64,
+    /// Where somebody looks, as shares of the picture from its upper left corner: what is near is drawn better.
+    pub gaze: Option<[f64; 2]>,
 }
 
 /// A technique and what it alone reads.
@@ -198,7 +209,8 @@ impl View {
             Dial::Error(found) if !(0.0..=1.0).contains(&found) => {
                 return Err(RenderError::MaxError { found });
             }
-            Dial::Full | Dial::Tolerance(_) | Dial::Error(_) => {}
+            Dial::Deadline(found) if !found.is_meaningful() => return Err(RenderError::Deadline { found }),
+            Dial::Full | Dial::Tolerance(_) | Dial::Error(_) | Dial::Deadline(_) => {}
         }
         let found = self.background;
         if !found.iter().all(|c| (0.0..=1.0).contains(c)) {
@@ -223,6 +235,13 @@ impl View {
     pub(crate) fn obeyed(&self, obeyed: fn(Dial) -> bool) -> Result<(), RenderError> {
         let dial = self.dial;
         if obeyed(dial) { Ok(()) } else { Err(RenderError::Dial { technique: self.how.name(), dial }) }
+    }
+}
+
+impl Deadline {
+    fn is_meaningful(&self) -> bool {
+        let is_place = |gaze: [f64; 2]| gaze.iter().all(|share| (0.0..=1.0).contains(share));
+        self.budget_secs >= 0.0 && self.budget_secs.is_finite() && self.gaze.is_none_or(is_place)
     }
 }
 

@@ -6,7 +6,7 @@ use volery_scene::{SampleType, camera, plane};
 
 use crate::residency;
 use crate::technique::stack;
-use crate::view::{Dial, Focus};
+use crate::view::{Deadline, Dial, Focus};
 
 /// Why a picture could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +20,7 @@ pub enum RenderError {
         found: &'static str,
     },
     /// A dial that the technique does not obey.
-    #[error("{technique}: dial is {dial:?}, expected {}", if *.technique == "stack" { "Full" } else { "Full or Tolerance" })]
+    #[error("{technique}: dial is {dial:?}, expected {}", match *.technique { "stack" => "Full or Deadline", "fans" => "Full or Tolerance", _ => "Full, Tolerance or Deadline" })]
     Dial {
         /// Name of the technique.
         technique: &'static str,
@@ -67,6 +67,12 @@ pub enum RenderError {
     Tolerance {
         /// As given.
         found: f64,
+    },
+    /// A deadline that is no time, or a gaze that is at no place of the picture.
+    #[error("deadline {} s with gaze {:?}, expected a number of at least 0, and shares from 0 to 1", .found.budget_secs, .found.gaze)]
+    Deadline {
+        /// As given.
+        found: Deadline,
     },
     /// A background that is no colour.
     #[error("background is {found:?}, expected three numbers in [0, 1]")]

@@ -8,6 +8,7 @@ pub(crate) struct Times {
     pub(crate) geometry: Option<f64>,
     pub(crate) upload: Option<f64>,
     pub(crate) draw: f64,
+    pub(crate) paced: Option<report::PacedFrame>,
 }
 
 impl Times {
@@ -20,12 +21,12 @@ impl Times {
         let mut sorted: Vec<&Self> = times.iter().collect();
         sorted.sort_by(|a, b| a.frame().total_cmp(&b.frame()));
         let median = sorted[(sorted.len() - 1) / 2];
-        let &Self { select, geometry, upload, draw } = median;
+        let &Self { select, geometry, upload, draw, .. } = median;
         report::Seconds { load: None, build, select, geometry, upload, draw, frame: median.frame() }
     }
 
     /// All of them, in order.
     pub(crate) fn frames(times: &[Self]) -> Vec<report::Frame> {
-        times.iter().map(|times| report::Frame { seconds: times.frame() }).collect()
+        times.iter().map(|times| report::Frame { seconds: times.frame(), paced: times.paced }).collect()
     }
 }

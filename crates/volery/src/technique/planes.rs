@@ -42,6 +42,7 @@ use crate::fit;
 use crate::histogram::Histogram;
 use crate::residency::Numbers;
 use crate::session::{RenderError, VerifyError};
+use crate::technique::raycast::coarser_by_tolerance;
 use crate::technique::{Drawing, Kept, Technique, Work};
 use crate::transfer;
 use crate::view::{self, Dial, How, PlaneView, Transfer, View, ViewOptions};
@@ -158,6 +159,10 @@ impl Technique<VolumeData> for Planes {
     fn check(&self, _: &VolumeData, view: &View) -> Result<(), RenderError> {
         view.of_values()?;
         planes_of(view).map_or(Ok(()), PlaneView::check)
+    }
+
+    fn coarser(&self, view: &View, rung: usize) -> Option<View> {
+        coarser_by_tolerance(view, rung)
     }
 
     fn plan(&mut self, volume: &mut VolumeData, view: &View) -> Result<super::Plan, RenderError> {

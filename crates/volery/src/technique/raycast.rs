@@ -1,9 +1,9 @@
 //! Ray casting over a cut of the octree.
 //!
 //! # Method
-//! One walk over the tree asks three filters: outside the view or perfectly transparent under the transfer
-//! function, a node is skipped; within the data tolerance it is drawn at its level; else its children are
-//! asked. The nodes left are put in exact visibility order and become the bricks of a frame. Skipped nodes
+//! One walk over the tree asks two filters: perfectly transparent under the transfer function, a node is skipped; within
+//! the data tolerance it is drawn at its level; else its children are asked. That cut is kept: of it, a camera sees the
+//! nodes that are not outside its view, which are put in exact visibility order and become the bricks of a frame. Skipped nodes
 //! cost nothing: they are neither read nor resident nor drawn. With a tolerance the cut is balanced and joined
 //! ([`seams`](mod@volery_octree::seams)): rays meet one continuous field.
 //!
@@ -15,7 +15,10 @@
 //! - Where levels meet, the field is continuous.
 
 use volery_frame::{JoinedBrick, RayTransfer, Revision};
-use volery_octree::{DataTolerance, Frustum, Joined, Transparency, Viewpoint, front_to_back, joined, select};
+use volery_octree::{
+    Answer, Cut, DataTolerance, Filter, Frustum, Joined, Transparency, Viewpoint, front_to_back, joined,
+    select,
+};
 use volery_pyramid::Node;
 use volery_reference::Tracer;
 use volery_scene::TransferFunction;
@@ -32,6 +35,22 @@ use crate::view::{Dial, How, View, ViewOptions};
 #[derive(Debug, Default)]
 pub(crate) struct Raycast {
     table: Kept<(TransferFunction, Revision), RayTransfer>,
+    cuts: Cuts,
+}
+
+/// The last cuts of some tolerances, whatever is in view.
+#[derive(Debug, Default)]
+struct Cuts(Vec<(f64, Kept<(TransferFunction, Revision), Joined>)>);
+
+impl Cuts {
+    /// A tolerance that was never asked for drives out the one that was asked for longest ago.
+    fn of(&mut self, tolerance: f64) -> &mut Kept<(TransferFunction, Revision), Joined> {
+        let found = self.0.iter().position(|(of, _)| *of == tolerance);
+        let kept = found.map(|place| self.0.remove(place)).unwrap_or_else(|| (tolerance, Kept::default()));
+        self.0.truncate(TOLERANCES.len());
+        self.0.insert(0, kept);
+        &mut self.0[0].1
+    }
 }
 
 impl Technique<VolumeData> for Raycast {
@@ -44,9 +63,17 @@ impl Technique<VolumeData> for Raycast {
     }
 
     fn check(&self, volume: &VolumeData, view: &View) -> Result<(), RenderError> {
-        view.obeyed(|dial| matches!(dial, Dial::Full | Dial::Tolerance(_)))?;
+        view.obeyed(|dial| matches!(dial, Dial::Full | Dial::Tolerance(_) | Dial::Deadline(_)))?;
         view.of_values()?;
         volume.check_matter(&view.how)
+    }
+
+    fn has_windows(&self) -> bool {
+        true
+    }
+
+    fn coarser(&self, view: &View, rung: usize) -> Option<View> {
+        coarser_by_tolerance(view, rung)
     }
 
     fn plan(&mut self, volume: &mut VolumeData, view: &View) -> Result<Plan, RenderError> {
@@ -60,32 +87,36 @@ impl Technique<VolumeData> for Raycast {
             if is_rounded { table.of_rounded_texels() } else { table }
         });
         let nodes = source.layout();
-        let seen =
-            (Transparency { source, transfer }, Frustum::new(nodes, &view.camera, view.width, view.height));
-        let Joined { cut, seams } = match volume.tolerance(view.dial) {
-            Some(tolerance) if tolerance > 0.0 => {
+        let tolerance = volume.tolerance(view.dial).unwrap_or(0.0);
+        let seen = self.cuts.of(tolerance).get(&(transfer.clone(), layout.revision), || {
+            let transparency = Transparency { source, transfer };
+            if tolerance > 0.0 {
                 let error =
                     |node: Node| source.stats(node).iter().map(|stats| stats.error).fold(0.0, f64::max);
-                joined(nodes, seen, error, tolerance)
-            }
-            // Coarse nodes, if there are any, show the finest field: nothing jumps.
-            _ => {
-                let (seen, tolerance) = (seen, 0.0);
-                let cut = select(nodes, (seen, DataTolerance { source, tolerance }));
+                joined(nodes, transparency, error, tolerance)
+            } else {
+                // Coarse nodes, if there are any, show the finest field: nothing jumps.
+                let cut = select(nodes, (transparency, DataTolerance { source, tolerance }));
                 Joined { seams: vec![0; cut.nodes.len()], cut }
             }
-        };
-        let order = front_to_back(nodes, &cut.nodes, Viewpoint::of(&view.camera, nodes));
-        let ordered: Vec<Node> = order.iter().map(|&place| cut.nodes[place]).collect();
+        });
+        let mut frustum = Frustum::new(nodes, &view.camera, view.width, view.height);
+        let mut is_seen = |node: Node| frustum.answer(node) != Answer::Skip;
+        let places: Vec<usize> =
+            (0..seen.cut.nodes.len()).filter(|&place| is_seen(seen.cut.nodes[place])).collect();
+        let in_view: Vec<Node> = places.iter().map(|&place| seen.cut.nodes[place]).collect();
+        let order = front_to_back(nodes, &in_view, Viewpoint::of(&view.camera, nodes));
         let numbers = Numbers::of(nodes);
         let brick = |&place: &usize| JoinedBrick {
-            placed: numbers.place(nodes, cut.nodes[place]),
-            seams: seams[place],
+            placed: numbers.place(nodes, in_view[place]),
+            seams: seen.seams[places[place]],
         };
         let bricks = order.iter().map(brick).collect();
+        let ordered = order.iter().map(|&place| in_view[place]).collect();
+        let in_view = Cut { nodes: in_view, skipped: Vec::new() };
         Ok(Plan {
             drawing: Drawing::Rays { transfer: table, bricks },
-            work: Work { nodes_by_level: Some(cut.nodes_by_level()), ..Work::default() },
+            work: Work { nodes_by_level: Some(in_view.nodes_by_level()), ..Work::default() },
             store: Some((store, ordered)),
             bound_max: None,
             geometry_seconds: None,
@@ -100,6 +131,15 @@ impl Technique<VolumeData> for Raycast {
     ) -> Result<volery_reference::Image, VerifyError> {
         matter_truth(volume, view, progress)
     }
+}
+
+/// Tolerances of coarser levels of detail, the last of which is the root.
+const TOLERANCES: [f64; 3] = [1.0 / 16.0, 0.25, 2.0];
+
+/// A view of a volume at a coarser level of detail.
+pub(crate) fn coarser_by_tolerance(view: &View, rung: usize) -> Option<View> {
+    let tolerance = *TOLERANCES.get(rung.checked_sub(1)?)?;
+    Some(View { dial: Dial::Tolerance(tolerance), ..view.clone() })
 }
 
 /// A view of all visible matter of a volume, the camera as near as it can be.

@@ -40,6 +40,9 @@ use crate::view::{Dial, How, StackView, Transfer, View, ViewOptions};
 
 use stacks::Stacks;
 
+/// The fewest slices of a coarser level of detail.
+const MIN_SLICES: usize = 8;
+
 /// Why cells could not be sliced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -96,11 +99,18 @@ impl Technique<GridData> for OfGrid {
     }
 
     fn check(&self, _: &GridData, view: &View) -> Result<(), RenderError> {
-        view.obeyed(|dial| dial == Dial::Full)?;
+        view.obeyed(|dial| matches!(dial, Dial::Full | Dial::Deadline(_)))?;
         match &view.how {
             How::Stack(StackView { num_slices: 0, .. }) => Err(RenderError::NoSlice),
             _ => Ok(()),
         }
+    }
+
+    fn coarser(&self, view: &View, rung: usize) -> Option<View> {
+        let How::Stack(stack) = &view.how else { return None };
+        let num_slices = stack.num_slices >> rung;
+        let how = How::Stack(StackView { num_slices, ..stack.clone() });
+        (num_slices >= MIN_SLICES).then(|| View { how, ..view.clone() })
     }
 
     fn forget_view(&mut self) {

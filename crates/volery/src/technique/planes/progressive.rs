@@ -124,7 +124,7 @@ impl Progressive<'_> {
         uploaded += self.session.upload(&plan, self.backend)?;
         let drawn = self.session.draw(&self.view, &plan, self.backend)?;
         let draw = start.elapsed().as_secs_f64();
-        let times = [Times { select, geometry: None, upload: Some(upload), draw }];
+        let times = [Times { select, geometry: None, upload: Some(upload), draw, paced: None }];
         let picture = self.session.picture(&self.view, plan, drawn, (uploaded, &times), self.backend);
         Ok(Step { picture, is_last })
     }

@@ -1,0 +1,375 @@
+//! Pictures by a deadline.
+//!
+//! # Method
+//! A picture of rays is cut into windows. Each is drawn with a ray for every pixel, or for squares of 2, 4 or 8 pixels,
+//! whichever [`volery_schedule`] says: it learns what windows take, shares the time out by what is lost in them, and
+//! makes windows finer as long as there is time (Li and Shen 2001, whose subvolumes are windows here: levels of the octree
+//! cost rays almost the same, since these step over what is empty and end where it is opaque). What was lost is foreseen
+//! from the last picture ([`windows`]). Planes and stacks are drawn whole, at one of several levels of detail; where the
+//! coarsest takes too long, in larger pixels.
+//!
+//! Bricks that are not resident are uploaded within a quarter of the budget. Where that is not enough, the picture is
+//! drawn from a coarser cut, and the rest comes with the next pictures.
+//!
+//! # Guarantees
+//! A picture is whole, whatever the budget. What the budget cannot hold is the floor: rays for squares of 8 pixels, or
+//! the coarsest level in pixels of 4; the report says so.
+//!
+//! # Limits
+//! What a device takes is learned: the first pictures of a session miss their deadline. A picture at rest is the same
+//! after some pictures, not after the first.
+
+mod windows;
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use volery_frame::backend::MAX_STRIDE;
+use volery_frame::{Backend, Device, DeviceKind, Drawn, Image, PictureView};
+use volery_scene::Camera;
+use volery_schedule::{Controller, Item, Level, Order, Scheduler, Settings, Step, Summary, importance};
+
+use super::{RenderError, Session};
+use crate::data::Data;
+use crate::report;
+use crate::residency::{self, Uploaded};
+use crate::technique::Plan;
+use crate::view::{Deadline, Dial, View};
+use windows::{Losses, STRIDES, Windows};
+
+/// Parts that a device may hold at one time: it never waits, and little is in its hands when time is up.
+const MAX_IN_FLIGHT: usize = 2;
+
+/// How long to sleep before looking again whether a device is done.
+const NAP: Duration = Duration::from_micros(50);
+
+/// Share of the budget that uploads may take.
+const UPLOAD_SHARE: f64 = 0.25;
+
+/// Of an upload, until one was seen.
+const FIRST_SECS_PER_BYTE: f64 = 2e-9;
+
+/// What larger pixels of whole pictures are, in pixels.
+const SHRINKS: [u32; 2] = [2, 4];
+
+/// Share of the picture's diagonal at which a gaze counts half.
+const GAZE_RADIUS: f64 = 0.1;
+
+/// What was learned of one technique on one device, for pictures of one size.
+pub(crate) struct Pace {
+    place: usize,
+    device: Device,
+    windows: Windows,
+    scheduler: Scheduler,
+    secs_per_byte: f64,
+    /// Of each window, from the last picture.
+    losses: Option<Vec<Losses>>,
+    /// Of the last picture.
+    camera: Option<Camera>,
+}
+
+/// A picture that was drawn by a deadline.
+pub(super) struct Paced {
+    pub(super) plan: Plan,
+    pub(super) drawn: Drawn,
+    pub(super) uploaded: Uploaded,
+    pub(super) frame: report::PacedFrame,
+    /// Whether nothing was left out.
+    pub(super) is_full: bool,
+}
+
+/// A frame under way: its clock, and what of it is decisions.
+struct Watch {
+    start: Instant,
+    control_secs: f64,
+}
+
+impl Watch {
+    fn elapsed(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+
+    /// Counts what takes decisions.
+    fn control<R>(&mut self, decide: impl FnOnce(f64) -> R) -> R {
+        let before = self.elapsed();
+        let decided = decide(before);
+        self.control_secs += self.elapsed() - before;
+        decided
+    }
+}
+
+/// Parts that a device was given, in order, and when it was done with the last.
+struct InFlight {
+    parts: VecDeque<(u32, u64, f64)>,
+    last_done: f64,
+}
+
+impl InFlight {
+    /// Tells the scheduler of what is done.
+    fn look(&mut self, backend: &mut dyn Backend, scheduler: &mut Scheduler, watch: &mut Watch) {
+        for part in backend.finished() {
+            let Some(place) = self.parts.iter().position(|(number, ..)| *number == part.number) else {
+                continue;
+            };
+            let Some((_, id, begun)) = self.parts.remove(place) else { continue };
+            watch.control(|now| {
+                scheduler.observe(id, now - begun.max(self.last_done));
+                self.last_done = now;
+            });
+        }
+    }
+}
+
+impl<D: Data> Session<D> {
+    /// Draws one picture by its deadline.
+    pub(super) fn draw_by(
+        &mut self,
+        view: &View,
+        deadline: Deadline,
+        place: usize,
+        backend: &mut dyn Backend,
+    ) -> Result<Paced, RenderError> {
+        let mut watch = Watch { start: Instant::now(), control_secs: 0.0 };
+        let (size, device) = ([view.width, view.height], backend.device());
+        let num_threads = if device.kind == DeviceKind::Software { rayon::current_num_threads() } else { 1 };
+        let windows = Windows::new(size, num_threads);
+        let is_same = |pace: &Pace| pace.place == place && pace.device == device && pace.windows == windows;
+        let mut pace = self.pace.take().filter(is_same).unwrap_or_else(|| Pace {
+            place,
+            device,
+            windows,
+            scheduler: Scheduler::new(Settings { order: Order::LargestFirst, ..Settings::default() }),
+            secs_per_byte: FIRST_SECS_PER_BYTE,
+            losses: None,
+            camera: None,
+        });
+        let is_rays = self.techniques[place].0.has_windows();
+        let paced = if is_rays {
+            self.draw_windows(view, deadline, (&mut pace, &mut watch), backend)
+        } else {
+            self.draw_whole(view, deadline, (&mut pace, &mut watch), backend)
+        };
+        self.pace = Some(pace);
+        paced
+    }
+
+    /// The plan of a rung: 0 is the full resolution.
+    fn plan_of(&mut self, view: &View, rung: usize, place: usize) -> Result<Option<Plan>, RenderError> {
+        let full = View { dial: Dial::Full, ..view.clone() };
+        let technique = &mut self.techniques[place].0;
+        let view = if rung == 0 { Some(full) } else { technique.coarser(&full, rung) };
+        view.map(|view| technique.plan(&mut self.data, &view)).transpose()
+    }
+
+    /// The best plan whose bricks can be there in time, and which rung it is.
+    fn resident_plan(
+        &mut self,
+        view: &View,
+        budget_secs: f64,
+        pace: &mut Pace,
+        backend: &mut dyn Backend,
+    ) -> Result<(Plan, usize, Uploaded), RenderError> {
+        let most_bytes = UPLOAD_SHARE * budget_secs / pace.secs_per_byte;
+        let (mut rung, mut finer) = (0, None);
+        let mut plan = self.plan_of(view, rung, pace.place)?.ok_or(RenderError::NoFrame)?;
+        while self.missing_bytes(&plan, backend) as f64 > most_bytes {
+            let Some(coarser) = self.plan_of(view, rung + 1, pace.place)? else { break };
+            finer = Some(std::mem::replace(&mut plan, coarser));
+            rung += 1;
+        }
+        let start = Instant::now();
+        let mut uploaded = self.upload(&plan, backend)?;
+        if let (Some(Plan { store: Some((store, nodes)), .. }), Some(source)) = (&finer, self.data.bricks()) {
+            let left = (most_bytes - uploaded.bytes as f64).max(0.0) as u64;
+            uploaded += residency::prefetch(source, store, nodes, left, backend)?;
+        }
+        if uploaded.bricks > 0 {
+            let secs_per_byte = start.elapsed().as_secs_f64() / uploaded.bytes.max(1) as f64;
+            pace.secs_per_byte += 0.5 * (secs_per_byte - pace.secs_per_byte);
+        }
+        Ok((plan, rung, uploaded))
+    }
+
+    /// Bytes of texels that a plan needs and a backend has not.
+    fn missing_bytes(&self, plan: &Plan, backend: &dyn Backend) -> u64 {
+        match (&plan.store, self.data.bricks()) {
+            (Some((store, nodes)), Some(source)) => residency::missing_bytes(source, store, nodes, backend),
+            _ => 0,
+        }
+    }
+
+    /// Draws a picture of rays window by window.
+    fn draw_windows(
+        &mut self,
+        view: &View,
+        deadline: Deadline,
+        (pace, watch): (&mut Pace, &mut Watch),
+        backend: &mut dyn Backend,
+    ) -> Result<Paced, RenderError> {
+        let (plan, rung, uploaded) = self.resident_plan(view, deadline.budget_secs, pace, backend)?;
+        let windows = pace.windows;
+        let levels = pace.levels();
+        watch.control(|_| pace.scheduler.begin(deadline.budget_secs, &pace.items(&levels, deadline)));
+        backend.begin_windows(&picture_view(view), windows.side)?;
+        let content = plan.drawing.content();
+        let mut strides = vec![MAX_STRIDE; windows.num() as usize];
+        let mut in_flight = InFlight { parts: VecDeque::new(), last_done: 0.0 };
+        loop {
+            in_flight.look(backend, &mut pace.scheduler, watch);
+            if in_flight.parts.len() >= MAX_IN_FLIGHT {
+                std::thread::sleep(NAP);
+                continue;
+            }
+            match watch.control(|now| pace.scheduler.next(now)) {
+                Step::Draw(part) => {
+                    let begun = watch.elapsed();
+                    strides[part.item] = STRIDES[part.level];
+                    let number = backend.draw_window(&content, part.item as u32, STRIDES[part.level])?;
+                    in_flight.parts.push_back((number, part.id, begun));
+                }
+                Step::Wait => std::thread::sleep(NAP),
+                Step::Done => break,
+            }
+        }
+        while !in_flight.parts.is_empty() {
+            in_flight.look(backend, &mut pace.scheduler, watch);
+            if !in_flight.parts.is_empty() {
+                std::thread::sleep(NAP);
+            }
+        }
+        let mut drawn = backend.finish()?;
+        watch.control(|_| pace.learn(&drawn.image, &strides, view));
+        windows.interpolate(&mut drawn.image, &strides);
+        let summary = pace.scheduler.finish(watch.elapsed());
+        let num_rays: f64 =
+            (0..).zip(&strides).map(|(window, &stride)| windows.num_rays(window, stride)).sum();
+        let pixels = f64::from(view.width) * f64::from(view.height);
+        let is_full = rung == 0 && strides.iter().all(|&stride| stride == 1);
+        let frame = paced_frame(&summary, watch, (num_rays / pixels).min(1.0), rung);
+        Ok(Paced { plan, drawn, uploaded, frame, is_full })
+    }
+
+    /// Draws planes or a stack at one of several levels, whole.
+    fn draw_whole(
+        &mut self,
+        view: &View,
+        deadline: Deadline,
+        (pace, watch): (&mut Pace, &mut Watch),
+        backend: &mut dyn Backend,
+    ) -> Result<Paced, RenderError> {
+        let full = View { dial: Dial::Full, ..view.clone() };
+        let technique = &self.techniques[pace.place].0;
+        let num_rungs = 1 + (1..).take_while(|&rung| technique.coarser(&full, rung).is_some()).count();
+        let choices: Vec<(usize, u32)> = (0..num_rungs)
+            .map(|rung| (rung, 1))
+            .chain(SHRINKS.map(|shrink| (num_rungs - 1, shrink)))
+            .collect();
+        let pixels = f64::from(view.width) * f64::from(view.height);
+        let level = |(error, &(rung, shrink)): (usize, &(usize, u32))| Level {
+            work: pixels * 0.5_f64.powi(rung as i32) / f64::from(shrink * shrink),
+            bytes: 0.0,
+            error: error as f64,
+        };
+        let levels: Vec<_> = choices.iter().enumerate().map(level).collect();
+        let item = Item { key: 0, importance: 1.0, levels: &levels };
+        watch.control(|_| pace.scheduler.begin(deadline.budget_secs, &[item]));
+        let mut last = None;
+        let mut uploaded = Uploaded::default();
+        while let Step::Draw(part) = watch.control(|now| pace.scheduler.next(now)) {
+            let begun = watch.elapsed();
+            let (rung, shrink) = choices[part.level];
+            let plan = self.plan_of(view, rung, pace.place)?.ok_or(RenderError::NoFrame)?;
+            uploaded += self.upload(&plan, backend)?;
+            let small = View {
+                width: view.width.div_ceil(shrink),
+                height: view.height.div_ceil(shrink),
+                ..view.clone()
+            };
+            let drawn = self.draw(&small, &plan, backend)?;
+            last = Some((plan, drawn, rung, shrink));
+            watch.control(|now| pace.scheduler.observe(part.id, now - begun));
+        }
+        let (plan, mut drawn, rung, shrink) = last.ok_or(RenderError::NoFrame)?;
+        if shrink > 1 {
+            drawn.image = windows::enlarge(&drawn.image, [view.width, view.height]);
+        }
+        let summary = pace.scheduler.finish(watch.elapsed());
+        let frame = paced_frame(&summary, watch, f64::from(shrink * shrink).recip(), rung);
+        Ok(Paced { plan, drawn, uploaded, frame, is_full: rung == 0 && shrink == 1 })
+    }
+}
+
+impl Pace {
+    /// The levels of all windows, one after the other.
+    fn levels(&self) -> Vec<Level> {
+        let level = |window: u32, (place, &stride): (usize, &u32)| {
+            let loss =
+                self.losses.as_ref().map_or(f64::from(stride - 1), |losses| losses[window as usize][place]);
+            Level {
+                work: self.windows.num_rays(window, stride),
+                bytes: 0.0,
+                error: if place == 0 { 0.0 } else { loss },
+            }
+        };
+        (0..self.windows.num())
+            .flat_map(|window| STRIDES.iter().enumerate().map(move |each| level(window, each)))
+            .collect()
+    }
+
+    fn items<'a>(&self, levels: &'a [Level], deadline: Deadline) -> Vec<Item<'a>> {
+        let size = self.windows.size.map(f64::from);
+        let radius = GAZE_RADIUS * size[0].hypot(size[1]);
+        let item = |(window, levels): (u32, &'a [Level])| {
+            let [first, last] = self.windows.bounds(window);
+            let centre = [0, 1].map(|axis| 0.5 * f64::from(first[axis] + last[axis]));
+            let near = deadline
+                .gaze
+                .map_or(1.0, |gaze| importance::gaze([gaze[0] * size[0], gaze[1] * size[1]], centre, radius));
+            Item { key: u64::from(window), importance: near * levels[1].error, levels }
+        };
+        (0..).zip(levels.chunks(STRIDES.len())).map(item).collect()
+    }
+
+    /// Foresees what the next picture would lose from what this one shows.
+    fn learn(&mut self, image: &Image, strides: &[u32], view: &View) {
+        let is_still = self.camera.replace(view.camera) == Some(view.camera);
+        let found = self.windows.losses(image, strides);
+        let Some(known) = &mut self.losses else {
+            self.losses = Some(found);
+            return;
+        };
+        for ((known, found), &drawn) in known.iter_mut().zip(found).zip(strides) {
+            for ((known, found), &stride) in known.iter_mut().zip(found).zip(&STRIDES) {
+                // Of details that were not drawn the last word counts, as long as nothing moves.
+                if stride > drawn {
+                    *known = found;
+                } else if !is_still {
+                    *known = 0.5 * (*known + found);
+                }
+            }
+        }
+    }
+}
+
+fn picture_view(view: &View) -> PictureView<'_> {
+    PictureView {
+        width: view.width,
+        height: view.height,
+        camera: view.camera,
+        background: view.background.map(|c| c as f32),
+        meshes: &view.meshes,
+    }
+}
+
+fn paced_frame(summary: &Summary, watch: &Watch, rays_per_pixel: f64, rung: usize) -> report::PacedFrame {
+    report::PacedFrame {
+        budget_seconds: summary.budget_secs,
+        predicted_seconds: summary.predicted_secs,
+        control_seconds: watch.control_secs,
+        parts: summary.num_parts,
+        refinements: summary.num_refinements,
+        rays_per_pixel,
+        rung,
+        is_at_floor: summary.is_at_floor,
+    }
+}
