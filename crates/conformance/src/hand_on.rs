@@ -70,14 +70,13 @@ macro_rules! hand_on {
             $to.begin_windows(view, side)
         }
     };
-    (@draw_window $this:ident, $to:expr) => {
-        fn draw_window(
+    (@draw_windows $this:ident, $to:expr) => {
+        fn draw_windows(
             &mut $this,
             content: &::volery_frame::Content<'_>,
-            window: u32,
-            stride: u32,
+            windows: &[::volery_frame::Window],
         ) -> Result<u32, ::volery_frame::DrawError> {
-            $to.draw_window(content, window, stride)
+            $to.draw_windows(content, windows)
         }
     };
     (@draw_part $this:ident, $to:expr) => {

@@ -1,7 +1,7 @@
 //! Pictures in windows: each shows the content that was drawn in it last, and that alone.
 
 use volery_frame::backend::{MAX_STRIDE, MAX_WINDOW_SIDE, WINDOW_STEP};
-use volery_frame::{Backend, Content, DrawError, Image};
+use volery_frame::{Backend, Content, DrawError, Image, Window};
 
 use super::oracle::assert_shows_something;
 use super::parts::{KINDS, Kind, MAX_RMSE, SIZE, World, assert_like, wide};
@@ -49,9 +49,14 @@ pub fn windows_show_their_content_alone(backend: &mut dyn Backend) {
             backend.begin_windows(&view, side).expect("the suite's pictures are small");
             let mut parts = 0;
             let mut draw = |content: &Content<'_>, wanted: &[Shown]| {
-                for (window, _) in (0..num).zip(&shown).filter(|(_, shown)| wanted.contains(shown)).rev() {
-                    assert_eq!(backend.draw_window(content, window, 1), Ok(parts), "the number of a part");
-                    parts += 1;
+                let windows: Vec<_> = (0..num)
+                    .filter(|&number| wanted.contains(&shown[number as usize]))
+                    .rev()
+                    .map(|number| Window { number, stride: 1 })
+                    .collect();
+                for windows in windows.chunks(3) {
+                    assert_eq!(backend.draw_windows(content, windows), Ok(parts), "the number of a part");
+                    parts += windows.len() as u32;
                 }
             };
             draw(&half, &[Shown::Whole, Shown::Half]);
@@ -79,7 +84,9 @@ pub fn strides_show_some_rays_of_the_picture(backend: &mut dyn Backend) {
     for window in 0..num {
         // What was drawn before with another stride is gone.
         for stride in [MAX_STRIDE / stride_of(window), stride_of(window)] {
-            backend.draw_window(&content, window, stride).expect("the suite's windows are right");
+            backend
+                .draw_windows(&content, &[Window { number: window, stride: stride }])
+                .expect("the suite's windows are right");
         }
     }
     let drawn = backend.finish().expect("a picture was begun");
@@ -103,7 +110,7 @@ pub fn strides_show_some_rays_of_the_picture(backend: &mut dyn Backend) {
     for (content, stride) in
         [(content, 0), (content, 3), (content, 2 * MAX_STRIDE), (world.whole(Kind::Planes), 2)]
     {
-        let found = backend.draw_window(&content, 0, stride);
+        let found = backend.draw_windows(&content, &[Window { number: 0, stride: stride }]);
         assert!(
             matches!(found, Err(DrawError::Window { found, .. }) if found == stride),
             "{stride}: {found:?}"
@@ -116,7 +123,7 @@ pub fn windows_that_are_none_are_refused(backend: &mut dyn Backend) {
     let world = World::new(backend, false);
     let (content, view) = (world.whole(Kind::Rays), world.view(&[]));
     assert_eq!(
-        backend.draw_window(&content, 0, 1),
+        backend.draw_windows(&content, &[Window { number: 0, stride: 1 }]),
         Err(DrawError::NoPicture),
         "a window without a beginning"
     );
@@ -126,16 +133,18 @@ pub fn windows_that_are_none_are_refused(backend: &mut dyn Backend) {
         assert_eq!(backend.finish().err(), Some(DrawError::NoPicture), "an end after a side of {side}");
     }
     backend.begin(&view).expect("the suite's pictures are small");
-    let found = backend.draw_window(&content, 0, 1);
+    let found = backend.draw_windows(&content, &[Window { number: 0, stride: 1 }]);
     assert!(matches!(found, Err(DrawError::Window { .. })), "a window of a whole picture: {found:?}");
     assert_eq!(backend.draw_part(&content), Ok(0), "a part after a window that was refused");
     let whole = backend.finish().expect("a picture was begun").image;
     let num = SIZE.map(|pixels| pixels.div_ceil(WINDOW_STEP)).iter().product::<u32>();
     backend.begin_windows(&view, WINDOW_STEP).expect("the suite's pictures are small");
     for window in 0..num {
-        backend.draw_window(&content, window, 1).expect("the suite's windows are right");
+        backend
+            .draw_windows(&content, &[Window { number: window, stride: 1 }])
+            .expect("the suite's windows are right");
     }
-    let found = backend.draw_window(&content, num, 1);
+    let found = backend.draw_windows(&content, &[Window { number: num, stride: 1 }]);
     assert!(matches!(found, Err(DrawError::Window { found, .. }) if found == num), "{found:?}");
     let drawn = backend.finish().expect("a picture was begun").image;
     assert_like("after a window that was refused", &drawn, &whole, MAX_RMSE);

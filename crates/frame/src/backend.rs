@@ -233,32 +233,34 @@ pub fn check_windows(view: &PictureView<'_>, side: u32) -> Result<u32, DrawError
 /// The most pixels per axis that may share a ray in a window.
 pub const MAX_STRIDE: u32 = 8;
 
-/// A check that every backend makes before it draws in a window.
+/// A window to draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Which: they count row by row.
+    pub number: u32,
+    /// Pixels per axis that share a ray.
+    pub stride: u32,
+}
+
+/// A check that every backend makes before it draws in a window, of which a picture has so many.
 ///
 /// # Errors
 /// [`DrawError::Window`].
-pub fn check_stride(content: &Content<'_>, stride: u32) -> Result<(), DrawError> {
+pub fn check_window(content: &Content<'_>, window: Window, num_windows: u32) -> Result<(), DrawError> {
+    let Window { number, stride } = window;
+    if number >= num_windows {
+        let expected = match num_windows {
+            0 => "a picture in windows".to_owned(),
+            _ => format!("0 to {}", num_windows - 1),
+        };
+        return Err(DrawError::Window { what: "the number", found: number, expected });
+    }
     let max = if matches!(content, Content::Rays(_)) { MAX_STRIDE } else { 1 };
     if stride.is_power_of_two() && stride <= max {
         return Ok(());
     }
     let expected = if max == 1 { "1 for what is no rays".to_owned() } else { "1, 2, 4 or 8".to_owned() };
     Err(DrawError::Window { what: "the stride", found: stride, expected })
-}
-
-/// A check that every backend makes before it draws a window, of which a picture has so many.
-///
-/// # Errors
-/// [`DrawError::Window`].
-pub fn check_window(window: u32, num_windows: u32) -> Result<(), DrawError> {
-    if window < num_windows {
-        return Ok(());
-    }
-    let expected = match num_windows {
-        0 => "a picture in windows".to_owned(),
-        _ => format!("0 to {}", num_windows - 1),
-    };
-    Err(DrawError::Window { what: "the number", found: window, expected })
 }
 
 /// Executes frames. Holds the bricks of one volume at a time.
@@ -307,15 +309,16 @@ pub trait Backend: Send {
     /// As [`Backend::begin`], and [`DrawError::Window`] when `side` is no such number.
     fn begin_windows(&mut self, view: &PictureView<'_>, side: u32) -> Result<(), DrawError>;
 
-    /// Shows content alone in a window, in place of what was there, and returns the number of the part. A window can so be
-    /// drawn better when there is time left. Need not wait until the device has drawn it.
+    /// Shows content alone in some windows, each once, in place of what was there; each is a part, and returned is the
+    /// number of the first. A window can so be drawn better when there is time left. Need not wait until the device has
+    /// drawn them.
     ///
     /// With a stride of 2, 4 or 8 ([`MAX_STRIDE`]) squares of so many pixels a side share the ray of their pixel
     /// `(stride / 2, stride / 2)`: of rays alone. Surfaces are behind in every pixel.
     ///
     /// # Errors
     /// As [`Backend::draw_part`], and [`DrawError::Window`] when there is no such window or stride.
-    fn draw_window(&mut self, content: &Content<'_>, window: u32, stride: u32) -> Result<u32, DrawError>;
+    fn draw_windows(&mut self, content: &Content<'_>, windows: &[Window]) -> Result<u32, DrawError>;
 
     /// Adds what comes next to the picture, behind all that it shows, and returns the number of the part: parts count
     /// from 0. Need not wait until the device has drawn it.

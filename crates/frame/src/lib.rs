@@ -21,7 +21,7 @@
 //! the content's own. So a picture may show what would not fit a device at one time, be looked at between parts, and be
 //! left when there is no more time.
 //!
-//! Or a picture is drawn window by window, each shown by one content in place of what it showed: by coarse bricks first,
+//! Or a picture is drawn window by window, each shows one content in place of what it showed: by coarse bricks first,
 //! by better ones as long as there is time.
 //!
 //! # Guarantees
@@ -42,6 +42,7 @@ pub mod sheets;
 
 pub use backend::{
     Backend, Device, DeviceKind, DrawError, Drawn, FinishedPart, Image, RayDoubt, UploadError, UploadedBytes,
+    Window,
 };
 pub use brick::{Brick, BrickId, JoinedBrick, PlacedBrick, TexelType, Texels, VolumeLayout};
 pub use brick_grid::BrickGrid;

@@ -22,5 +22,5 @@ pub mod simulate;
 pub use cost::CostModel;
 pub use errors::ErrorRecord;
 pub use item::{Controller, Item, Level, Part, Step, Summary};
-pub use plan::{PlanItem, plan};
+pub use plan::{PlanItem, Rule, plan};
 pub use scheduler::{Order, Scheduler, Settings};

@@ -6,6 +6,8 @@
 //! an item leaves goes to the next. Levels are few, so something is left after the last one: items are then made finer,
 //! one level at a time, where `importance * error removed / seconds` is largest, as long as it fits.
 //!
+//! Where errors are known ([`Rule::LeastError`]), all of the budget goes that way: from the coarsest levels on.
+//!
 //! # Guarantees
 //! The sum of costs is within the budget, or all items are at their coarsest. O(n log n).
 
@@ -13,6 +15,16 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::item::{amount, secs as sane_secs, weights};
+
+/// How a budget is shared out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rule {
+    /// By importance; what is left goes where it removes most error.
+    #[default]
+    Shares,
+    /// All of it goes where it removes most error times importance: greedily, from the coarsest levels on.
+    LeastError,
+}
 
 /// An item whose costs are known.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +38,7 @@ pub struct PlanItem<'a> {
 }
 
 /// Which level each item gets if costs are as predicted; none for an item without levels.
-pub fn plan(budget_secs: f64, items: &[PlanItem<'_>]) -> Vec<Option<usize>> {
+pub fn plan(budget_secs: f64, rule: Rule, items: &[PlanItem<'_>]) -> Vec<Option<usize>> {
     let mut table = Table::default();
     weights(items.iter().map(|item| item.importance), &mut table.weights);
     for item in items {
@@ -38,8 +50,7 @@ pub fn plan(budget_secs: f64, items: &[PlanItem<'_>]) -> Vec<Option<usize>> {
     }
     let limit = Limit { budget_secs: sane_secs(budget_secs), sigmas: 0.0 };
     let mut levels = Vec::new();
-    table.share(&limit, &mut levels);
-    table.refine(&limit, &mut levels);
+    table.plan(&limit, rule, &mut levels);
     levels.iter().enumerate().map(|(item, &level)| (table.num_levels(item) > 0).then_some(level)).collect()
 }
 
@@ -164,8 +175,14 @@ impl Table {
     }
 
     /// Levels within a limit.
-    pub(crate) fn plan(&self, limit: &Limit, levels: &mut Vec<usize>) {
-        self.share(limit, levels);
+    pub(crate) fn plan(&self, limit: &Limit, rule: Rule, levels: &mut Vec<usize>) {
+        match rule {
+            Rule::Shares => self.share(limit, levels),
+            Rule::LeastError => {
+                levels.clear();
+                levels.extend((0..self.len()).map(|item| self.num_levels(item).saturating_sub(1)));
+            }
+        }
         self.refine(limit, levels);
     }
 }

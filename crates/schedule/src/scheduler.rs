@@ -52,6 +52,7 @@ use std::collections::BTreeMap;
 
 use crate::cost::CostModel;
 use crate::item::{Controller, Item, Part, Step, Summary};
+use crate::plan::Rule;
 use frame::{Frame, InFlight};
 use outside::Outside;
 use rest::Rest;
@@ -81,6 +82,8 @@ pub enum Order {
 pub struct Settings {
     /// Whether the first pass may be in another order.
     pub order: Order,
+    /// How the budget is shared out.
+    pub rule: Rule,
     /// How far from the budget a frame may end, relative to it. Parts that stall may take this much beyond the budget.
     pub tolerance: f64,
     /// A level stays while importance moved by less than this, relative to when it was chosen.
@@ -97,6 +100,7 @@ impl Default for Settings {
     fn default() -> Self {
         Settings {
             order: Order::Kept,
+            rule: Rule::Shares,
             tolerance: 0.05,
             importance_threshold: 0.1,
             rest_threshold: 1e-3,

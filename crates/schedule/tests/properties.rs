@@ -4,7 +4,7 @@ mod drive;
 
 use drive::{Owned, Played, borrow, play};
 use proptest::prelude::*;
-use volery_schedule::{Level, Order, PlanItem, Scheduler, Settings, plan};
+use volery_schedule::{Level, Order, PlanItem, Rule, Scheduler, Settings, plan};
 
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![
@@ -91,6 +91,7 @@ proptest! {
     fn a_plan_fits_and_leaves_nothing_that_fits(
         costs in prop::collection::vec((any_number(), prop::collection::vec(0.0_f64..1.0, 0..6)), 0..30),
         budget_secs in 0.0_f64..10.0,
+        rule in prop::sample::select(vec![Rule::Shares, Rule::LeastError]),
     ) {
         let errors = [0.0, 1.0, 3.0, 7.0, 15.0, 31.0];
         // Finer levels cost more.
@@ -100,7 +101,7 @@ proptest! {
             .iter()
             .map(|(importance, secs)| PlanItem { importance: *importance, secs, errors: &errors })
             .collect();
-        let levels = plan(budget_secs, &items);
+        let levels = plan(budget_secs, rule, &items);
         prop_assert_eq!(levels.len(), items.len());
         let mut sum = 0.0;
         let mut is_at_floor = true;
@@ -118,6 +119,28 @@ proptest! {
                 prop_assert!(finer > budget_secs * (1.0 - 1e-9), "a finer level fits: {} of {}", finer, budget_secs);
             }
         }
+    }
+}
+
+proptest! {
+    /// Levels each four times dearer that remove ever less error: greedy is within one step of the least error there is, so
+    /// no other plan is better by more.
+    #[test]
+    fn least_error_is_less_than_that_of_shares(
+        scales in prop::collection::vec((0.1_f64..10.0, 0.01_f64..100.0), 1..40),
+        budget in 0.0_f64..1.0,
+    ) {
+        let costs: Vec<[f64; 4]> = scales.iter().map(|(cost, _)| [64.0, 16.0, 4.0, 1.0].map(|times| times * cost)).collect();
+        let errors: Vec<[f64; 4]> = scales.iter().map(|(_, error)| [0.0, 1.0, 3.0, 9.0].map(|times| times * error)).collect();
+        let items: Vec<_> =
+            costs.iter().zip(&errors).map(|(secs, errors)| PlanItem { importance: 1.0, secs, errors }).collect();
+        let budget_secs = budget * costs.iter().map(|secs| secs[0]).sum::<f64>();
+        let [shares, least] = [Rule::Shares, Rule::LeastError].map(|rule| {
+            let levels = plan(budget_secs, rule, &items);
+            levels.iter().zip(&errors).filter_map(|(level, errors)| Some(errors[(*level)?])).sum::<f64>()
+        });
+        let step = errors.iter().map(|errors| errors[3] - errors[2]).fold(0.0, f64::max);
+        prop_assert!(least <= shares + step, "{} beside {} of shares", least, shares);
     }
 }
 

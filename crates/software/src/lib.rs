@@ -61,10 +61,10 @@ mod walk;
 use std::time::Instant;
 
 use fearless_simd::Level;
-use volery_frame::backend::{check_content, check_stride, check_view, check_window, check_windows};
+use volery_frame::backend::{check_content, check_view, check_window, check_windows};
 use volery_frame::{
     Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, Frame, PictureView,
-    Revision, UploadError, UploadedBytes, VolumeLayout,
+    Revision, UploadError, UploadedBytes, VolumeLayout, Window,
 };
 
 use crate::pool::{Pool, for_bricks};
@@ -157,11 +157,24 @@ impl SoftwareBackend {
                 target.shown.add_cubes();
             }
         }
-        let number = target.shown.num_parts - 1;
+        let first = target.shown.num_parts - 1;
         let seconds = start.elapsed().as_secs_f64();
         self.seconds += seconds;
-        self.finished.push(FinishedPart { number, device_seconds: Some(seconds) });
-        Ok(number)
+        let mut finish = |number, seconds| {
+            self.finished.push(FinishedPart { number, device_seconds: Some(seconds) });
+        };
+        if target.windows.is_empty() {
+            finish(first, seconds);
+            return Ok(first);
+        }
+        // Windows that are drawn at one time share its seconds.
+        let sum: f64 = target.window_seconds.iter().sum();
+        for (number, of_threads) in (first..).zip(&target.window_seconds) {
+            let share = if sum > 0.0 { of_threads / sum } else { 1.0 / target.windows.len() as f64 };
+            finish(number, share * seconds);
+        }
+        target.shown.num_parts = first + target.windows.len() as u32;
+        Ok(first)
     }
 }
 
@@ -236,15 +249,17 @@ impl Backend for SoftwareBackend {
         checked.map(drop)
     }
 
-    fn draw_window(&mut self, content: &Content<'_>, window: u32, stride: u32) -> Result<u32, DrawError> {
+    fn draw_windows(&mut self, content: &Content<'_>, windows: &[Window]) -> Result<u32, DrawError> {
         let picture = self.picture.as_mut().ok_or(DrawError::NoPicture)?;
         let num_windows = picture.window_side.map_or(Ok(0), |side| check_windows(&picture.view, side))?;
-        check_window(window, num_windows)?;
-        check_stride(content, stride)?;
-        (picture.window, picture.stride) = (Some(window), stride);
+        windows.iter().try_for_each(|&window| check_window(content, window, num_windows))?;
+        if windows.is_empty() {
+            return Ok(picture.shown.num_parts);
+        }
+        picture.windows = windows.to_vec();
         let number = self.draw_some(content, true);
         if let Some(picture) = &mut self.picture {
-            picture.window = None;
+            picture.windows.clear();
         }
         number
     }

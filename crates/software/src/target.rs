@@ -5,9 +5,11 @@
 //! crosses planes or sums cubes and sheets goes on from what is there, which f32 holds to the bit, so where a picture is
 //! cut into parts cannot be seen. Surfaces and the background come behind all parts, at the end.
 
+use std::time::Instant;
+
 use fearless_simd::{Level, dispatch, prelude::*};
 use rayon::prelude::*;
-use volery_frame::{Image, PictureView, RayDoubt};
+use volery_frame::{Image, PictureView, RayDoubt, Window};
 
 use crate::math::axes;
 use crate::surfaces::Surfaces;
@@ -46,11 +48,12 @@ pub(crate) struct Target {
     /// Row by row; whole even where they reach over the edge of the picture.
     pub(crate) tiles: Vec<Tile>,
     pub(crate) shown: Shown,
-    /// Pixels of a window per axis, if it is drawn in windows; and the one that is drawn now.
+    /// Pixels of a window per axis, if it is drawn in windows; and those that are drawn now, the whole picture if none
+    /// are.
     pub(crate) window_side: Option<u32>,
-    pub(crate) window: Option<u32>,
-    /// Pixels per axis that share a ray in it.
-    pub(crate) stride: u32,
+    pub(crate) windows: Vec<Window>,
+    /// What each of those took of all threads together.
+    pub(crate) window_seconds: Vec<f64>,
 }
 
 /// What the parts so far were.
@@ -149,37 +152,61 @@ impl Target {
             tiles: std::iter::repeat_with(|| Tile::EMPTY).take(num_tiles).collect(),
             shown: Shown::default(),
             window_side: None,
-            window: None,
-            stride: 1,
+            windows: Vec::new(),
+            window_seconds: Vec::new(),
         }
     }
 
-    /// First and last tile along x and y of what is drawn now.
-    pub(crate) fn tile_range(&self) -> [[u32; 2]; 2] {
+    /// First and last tile along x and y of a window.
+    fn window_tiles(&self, number: u32) -> [[u32; 2]; 2] {
         let last = [self.view.width, self.view.height].map(|pixels| (pixels - 1) / TILE);
-        let Some((window, side)) = self.window.zip(self.window_side) else { return [[0; 2], last] };
+        let Some(side) = self.window_side else { return [[0; 2], last] };
         let [tiles, across] = [side / TILE, self.view.width.div_ceil(side)];
-        let first = [window % across * tiles, window / across * tiles];
+        let first = [number % across * tiles, number / across * tiles];
         [first, [0, 1].map(|axis| last[axis].min(first[axis] + tiles - 1))]
     }
 
+    /// First and last tile along x and y of all that is drawn now.
+    pub(crate) fn tile_range(&self) -> [[u32; 2]; 2] {
+        let ranges = self.windows.iter().map(|window| self.window_tiles(window.number));
+        let join = |[a, b]: [[u32; 2]; 2], [c, d]: [[u32; 2]; 2]| {
+            [[0, 1].map(|axis| a[axis].min(c[axis])), [0, 1].map(|axis| b[axis].max(d[axis]))]
+        };
+        let last = [self.view.width, self.view.height].map(|pixels| (pixels - 1) / TILE);
+        ranges.reduce(join).unwrap_or([[0; 2], last])
+    }
+
     /// Runs `draw` for every tile that is drawn now, with the surfaces, its number and the column and row of its first
-    /// pixel. The tiles of a window show nothing before.
+    /// pixel. The tiles of windows show nothing before.
     pub(crate) fn draw_tiles(&mut self, draw: impl Fn(&Surfaces, u32, [u32; 2], &mut Tile) + Sync) {
         let columns = self.view.width.div_ceil(TILE);
-        let [[x0, y0], [x1, y1]] = self.tile_range();
-        let is_drawn =
-            |index: u32| (x0..=x1).contains(&(index % columns)) && (y0..=y1).contains(&(index / columns));
-        let (is_window, stride) = (self.window.is_some(), self.stride);
-        let Self { surfaces, tiles, .. } = self;
-        let tiles: Vec<_> = (0..).zip(tiles).filter(|(index, _)| is_drawn(*index)).collect();
-        tiles.into_par_iter().for_each(|(index, tile)| {
-            if is_window {
+        let mut window_of: Vec<Option<usize>> = vec![None; self.tiles.len()];
+        for (place, window) in self.windows.iter().enumerate() {
+            let [[x0, y0], [x1, y1]] = self.window_tiles(window.number);
+            for (x, y) in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (x, y))) {
+                window_of[(y * columns + x) as usize] = Some(place);
+            }
+        }
+        let Self { surfaces, tiles, windows, .. } = self;
+        let is_whole = windows.is_empty();
+        let tiles = (0_u32..).zip(tiles).zip(window_of).filter(|(_, window)| is_whole || window.is_some());
+        let tiles: Vec<_> = tiles.collect();
+        let seconds = tiles.into_par_iter().map(|((index, tile), window)| {
+            let start = Instant::now();
+            if let Some(window) = window {
                 tile.clear();
-                tile.stride = stride;
+                tile.stride = windows[window].stride;
             }
             draw(surfaces, index, [index % columns * TILE, index / columns * TILE], tile);
+            (window, start.elapsed().as_secs_f64())
         });
+        let seconds: Vec<_> = seconds.collect();
+        self.window_seconds = vec![0.0; windows.len()];
+        for (window, seconds) in seconds {
+            if let Some(window) = window {
+                self.window_seconds[window] += seconds;
+            }
+        }
     }
 
     /// What the rays of all parts may be off by, if there were any.
@@ -220,8 +247,9 @@ impl Target {
                 }
                 let Some(light) = &tile.light else { continue };
                 if tile.stride > 1 {
+                    let shift = tile.stride.trailing_zeros();
                     for (column, pixel) in (0..).zip(pixels) {
-                        let [x, y] = [column, row % TILE].map(|place| place / tile.stride);
+                        let [x, y] = [column, row % TILE].map(|place| place >> shift);
                         let packet = &light[(y / PACKET * TILE_PACKETS + x / PACKET) as usize];
                         let lane = (y % PACKET * PACKET + x % PACKET) as usize;
                         *pixel = self.shown.over([0, 1, 2, 3].map(|i| packet[i][lane]), *pixel);

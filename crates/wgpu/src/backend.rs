@@ -1,9 +1,9 @@
 //! The backend: one volume's bricks, and what of the last frame can be used again.
 
-use volery_frame::backend::{check_content, check_stride, check_view, check_window, check_windows};
+use volery_frame::backend::{check_content, check_view, check_window, check_windows};
 use volery_frame::{
     Backend, Brick, BrickId, Content, Device, DeviceKind, DrawError, Drawn, FinishedPart, PictureView,
-    Revision, UploadError, UploadedBytes, VolumeLayout,
+    Revision, UploadError, UploadedBytes, VolumeLayout, Window,
 };
 
 use crate::adapter::{self, OpenError, device_of};
@@ -169,11 +169,9 @@ impl WgpuBackend {
     }
 
     /// Draws a part of the whole picture or in one window.
-    fn draw_some(&mut self, content: &Content<'_>, window: Option<(u32, u32)>) -> Result<u32, DrawError> {
-        let picture = self.picture.as_ref().ok_or(DrawError::NoPicture)?;
-        if let Some((window, stride)) = window {
-            check_window(window, picture.num_windows())?;
-            check_stride(content, stride)?;
+    fn draw_some(&mut self, content: &Content<'_>, window: Option<Window>) -> Result<u32, DrawError> {
+        if self.picture.is_none() {
+            return Err(DrawError::NoPicture);
         }
         check_content(content, self.pool.as_ref().map(Pool::layout))?;
         if let Some(brick) = content.bricks().find(|brick| !self.is_resident(brick.id)) {
@@ -243,8 +241,14 @@ impl Backend for WgpuBackend {
         self.draw_some(content, None)
     }
 
-    fn draw_window(&mut self, content: &Content<'_>, window: u32, stride: u32) -> Result<u32, DrawError> {
-        self.draw_some(content, Some((window, stride)))
+    fn draw_windows(&mut self, content: &Content<'_>, windows: &[Window]) -> Result<u32, DrawError> {
+        let picture = self.picture.as_ref().ok_or(DrawError::NoPicture)?;
+        let (first, num_windows) = (picture.num_parts(), picture.num_windows());
+        windows.iter().try_for_each(|&window| check_window(content, window, num_windows))?;
+        for &window in windows {
+            self.draw_some(content, Some(window))?;
+        }
+        Ok(first)
     }
 
     fn finished(&mut self) -> Vec<FinishedPart> {

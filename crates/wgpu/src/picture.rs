@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use volery_frame::{Drawn, Image, PictureView, Sheets};
+use volery_frame::{Drawn, Image, PictureView, Sheets, Window};
 use volery_shaders::finish;
 
 use crate::bindings::{bind_group, bind_group_layout, buffer, pipeline_layout, shader_module};
@@ -159,11 +159,16 @@ impl Picture {
     }
 
     /// Draws one window alone from now on, with a stride, or all.
-    pub(crate) fn set_window(&mut self, window: Option<(u32, u32)>) {
-        self.window = window.map(|(window, _)| window as usize);
-        if let Some((window, stride)) = window {
-            self.tiles[window as usize].stride = stride;
+    pub(crate) fn set_window(&mut self, window: Option<Window>) {
+        self.window = window.map(|window| window.number as usize);
+        if let Some(Window { number, stride }) = window {
+            self.tiles[number as usize].stride = stride;
         }
+    }
+
+    /// Parts so far.
+    pub(crate) fn num_parts(&self) -> u32 {
+        self.shown.num_parts
     }
 
     /// Windows, if it is drawn in such.

@@ -47,7 +47,7 @@ impl Scheduler {
             return;
         }
         let limit = Limit { budget_secs: frame.end_secs.max(0.0) / mean, sigmas: 0.0 };
-        table.plan(&limit, levels);
+        table.plan(&limit, settings.rule, levels);
         let ideal = levels.clone();
         for (item, slot) in frame.slots.iter_mut().enumerate() {
             slot.chosen_importance = slot.importance;

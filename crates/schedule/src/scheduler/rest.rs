@@ -107,7 +107,7 @@ impl Scheduler {
             sigmas: self.settings.rest_sigmas * errors.deviation() / mean,
         };
         let mut levels = Vec::new();
-        self.frame.table.plan(&limit, &mut levels);
+        self.frame.table.plan(&limit, self.settings.rule, &mut levels);
         for (slot, &level) in self.frame.slots.iter().zip(&levels) {
             if let Some(anchor) = self.rest.anchors.get_mut(&slot.key) {
                 anchor.level = Some(level);

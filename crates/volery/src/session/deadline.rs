@@ -25,9 +25,11 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use volery_frame::backend::MAX_STRIDE;
-use volery_frame::{Backend, Device, DeviceKind, Drawn, Image, PictureView};
+use volery_frame::{Backend, Device, DeviceKind, Drawn, Image, PictureView, Window};
 use volery_scene::Camera;
-use volery_schedule::{Controller, Item, Level, Order, Scheduler, Settings, Step, Summary, importance};
+use volery_schedule::{
+    Controller, Item, Level, Order, Part, Rule, Scheduler, Settings, Step, Summary, importance,
+};
 
 use super::{RenderError, Session};
 use crate::data::Data;
@@ -102,6 +104,8 @@ impl Watch {
 struct InFlight {
     parts: VecDeque<(u32, u64, f64)>,
     last_done: f64,
+    /// Whether parts are done when they are handed out, several at one time: then the device says what each took.
+    is_at_once: bool,
 }
 
 impl InFlight {
@@ -113,7 +117,8 @@ impl InFlight {
             };
             let Some((_, id, begun)) = self.parts.remove(place) else { continue };
             watch.control(|now| {
-                scheduler.observe(id, now - begun.max(self.last_done));
+                let told = part.device_seconds.filter(|_| self.is_at_once);
+                scheduler.observe(id, told.unwrap_or(now - begun.max(self.last_done)));
                 self.last_done = now;
             });
         }
@@ -131,14 +136,17 @@ impl<D: Data> Session<D> {
     ) -> Result<Paced, RenderError> {
         let mut watch = Watch { start: Instant::now(), control_secs: 0.0 };
         let (size, device) = ([view.width, view.height], backend.device());
-        let num_threads = if device.kind == DeviceKind::Software { rayon::current_num_threads() } else { 1 };
-        let windows = Windows::new(size, num_threads);
+        let windows = Windows::new(size);
         let is_same = |pace: &Pace| pace.place == place && pace.device == device && pace.windows == windows;
         let mut pace = self.pace.take().filter(is_same).unwrap_or_else(|| Pace {
             place,
             device,
             windows,
-            scheduler: Scheduler::new(Settings { order: Order::LargestFirst, ..Settings::default() }),
+            scheduler: Scheduler::new(Settings {
+                order: Order::LargestFirst,
+                rule: Rule::LeastError,
+                ..Settings::default()
+            }),
             secs_per_byte: FIRST_SECS_PER_BYTE,
             losses: None,
             camera: None,
@@ -213,23 +221,39 @@ impl<D: Data> Session<D> {
         backend.begin_windows(&picture_view(view), windows.side)?;
         let content = plan.drawing.content();
         let mut strides = vec![MAX_STRIDE; windows.num() as usize];
-        let mut in_flight = InFlight { parts: VecDeque::new(), last_done: 0.0 };
-        loop {
+        let mut in_flight =
+            InFlight { parts: VecDeque::new(), last_done: 0.0, is_at_once: pace.is_at_once() };
+        let batch = pace.batch();
+        let (mut step, mut held) = (Step::Wait, None);
+        while step != Step::Done || held.is_some() {
             in_flight.look(backend, &mut pace.scheduler, watch);
             if in_flight.parts.len() >= MAX_IN_FLIGHT {
                 std::thread::sleep(NAP);
                 continue;
             }
-            match watch.control(|now| pace.scheduler.next(now)) {
-                Step::Draw(part) => {
-                    let begun = watch.elapsed();
-                    strides[part.item] = STRIDES[part.level];
-                    let number = backend.draw_window(&content, part.item as u32, STRIDES[part.level])?;
-                    in_flight.parts.push_back((number, part.id, begun));
+            let mut parts: Vec<Part> = held.take().into_iter().collect();
+            watch.control(|now| {
+                while parts.len() < batch && step != Step::Done {
+                    step = pace.scheduler.next(now);
+                    let Step::Draw(part) = step else { break };
+                    // A window that comes again is drawn when it was.
+                    if parts.iter().any(|other| other.item == part.item) {
+                        held = Some(part);
+                        break;
+                    }
+                    parts.push(part);
                 }
-                Step::Wait => std::thread::sleep(NAP),
-                Step::Done => break,
+            });
+            if parts.is_empty() {
+                std::thread::sleep(NAP);
+                continue;
             }
+            let begun = watch.elapsed();
+            let window = |part: &Part| Window { number: part.item as u32, stride: STRIDES[part.level] };
+            let list: Vec<Window> = parts.iter().map(window).collect();
+            list.iter().for_each(|window| strides[window.number as usize] = window.stride);
+            let first = backend.draw_windows(&content, &list)?;
+            in_flight.parts.extend((first..).zip(&parts).map(|(number, part)| (number, part.id, begun)));
         }
         while !in_flight.parts.is_empty() {
             in_flight.look(backend, &mut pace.scheduler, watch);
@@ -300,19 +324,33 @@ impl<D: Data> Session<D> {
 }
 
 impl Pace {
+    /// Whether the device is this one, whose parts are done when a call returns.
+    fn is_at_once(&self) -> bool {
+        self.device.kind == DeviceKind::Software
+    }
+
+    /// Parts that are handed out at one time: so many that no thread has nothing to do, or one.
+    fn batch(&self) -> usize {
+        if self.is_at_once() { 2 * rayon::current_num_threads() } else { 1 }
+    }
+
     /// The levels of all windows, one after the other.
     fn levels(&self) -> Vec<Level> {
-        let level = |window: u32, (place, &stride): (usize, &u32)| {
-            let loss =
-                self.losses.as_ref().map_or(f64::from(stride - 1), |losses| losses[window as usize][place]);
+        let level = |window: u32, place: usize| {
+            let loss = self
+                .losses
+                .as_ref()
+                .map_or(f64::from(STRIDES[place] - 1), |losses| losses[window as usize][place]);
+            // What counts is the sum of squares over pixels.
+            let error = self.windows.num_rays(window, 1) * loss.powi(2);
             Level {
-                work: self.windows.num_rays(window, stride),
+                work: self.windows.num_rays(window, STRIDES[place]),
                 bytes: 0.0,
-                error: if place == 0 { 0.0 } else { loss },
+                error: if place == 0 { 0.0 } else { error },
             }
         };
         (0..self.windows.num())
-            .flat_map(|window| STRIDES.iter().enumerate().map(move |each| level(window, each)))
+            .flat_map(|window| (0..STRIDES.len()).map(move |place| level(window, place)))
             .collect()
     }
 
@@ -325,7 +363,7 @@ impl Pace {
             let near = deadline
                 .gaze
                 .map_or(1.0, |gaze| importance::gaze([gaze[0] * size[0], gaze[1] * size[1]], centre, radius));
-            Item { key: u64::from(window), importance: near * levels[1].error, levels }
+            Item { key: u64::from(window), importance: near, levels }
         };
         (0..).zip(levels.chunks(STRIDES.len())).map(item).collect()
     }

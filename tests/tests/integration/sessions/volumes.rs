@@ -13,7 +13,7 @@ use volery::{
 };
 use volery_frame::{
     Brick, BrickId, Content, DrawError, Drawn, FinishedPart, PictureView, Revision, UploadError,
-    UploadedBytes, VolumeLayout,
+    UploadedBytes, VolumeLayout, Window,
 };
 
 fn software() -> Box<dyn Backend> {
@@ -243,7 +243,7 @@ impl Backend for Narrow {
         self.begin(view)
     }
 
-    fn draw_window(&mut self, content: &Content<'_>, _: u32, _: u32) -> Result<u32, DrawError> {
+    fn draw_windows(&mut self, content: &Content<'_>, _: &[Window]) -> Result<u32, DrawError> {
         self.draw_part(content)
     }
 

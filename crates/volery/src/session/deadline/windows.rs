@@ -33,12 +33,10 @@ pub(super) struct Windows {
 pub(super) type Losses = [f64; STRIDES.len()];
 
 impl Windows {
-    /// Of a picture, each at least so many tiles large that threads have something to share.
-    pub(super) fn new(size: [u32; 2], num_threads: usize) -> Self {
+    pub(super) fn new(size: [u32; 2]) -> Self {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let wanted = (pixels / NUM_WINDOWS).sqrt() / f64::from(WINDOW_STEP);
-        let least = (2.0 * num_threads as f64).sqrt().ceil();
-        let steps = wanted.floor().max(least).min(f64::from(MAX_WINDOW_SIDE / WINDOW_STEP)).max(1.0);
+        let steps = wanted.floor().min(f64::from(MAX_WINDOW_SIDE / WINDOW_STEP)).max(1.0);
         Self { size, side: steps as u32 * WINDOW_STEP }
     }
 
@@ -74,38 +72,44 @@ impl Windows {
         }
         let shown = image.pixels.clone();
         let [width, height] = self.size;
-        let at = |x: i64, y: i64| {
-            let [x, y] = [x.clamp(0, i64::from(width) - 1), y.clamp(0, i64::from(height) - 1)];
-            shown[(y * i64::from(width) + x) as usize]
-        };
+        let side = self.side as usize;
         image.pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row, y)| {
-            for (first, pixels) in
-                (0..width).step_by(self.side as usize).zip(row.chunks_mut(self.side as usize))
-            {
+            for (first, pixels) in (0..width).step_by(side).zip(row.chunks_mut(side)) {
                 let stride = self.stride_at(strides, [first, y]);
-                if stride == 1 {
-                    continue;
-                }
-                let step = f64::from(stride) as f32;
-                let (above, down) = around(y, stride);
-                for (x, pixel) in (first..).zip(pixels) {
-                    let (left, right) = around(x, stride);
-                    let end = i64::from(stride);
-                    let corners = [
-                        at(left, above),
-                        at(left + end, above),
-                        at(left, above + end),
-                        at(left + end, above + end),
-                    ];
-                    let [u, v] = [right as f32 / step, down as f32 / step];
-                    *pixel = [0, 1, 2].map(|channel| {
-                        let [a, b, c, d] = corners.map(|corner| corner[channel]);
-                        let (upper, lower) = (a + u * (b - a), c + u * (d - c));
-                        upper + v * (lower - upper)
-                    });
+                if stride > 1 {
+                    self.interpolate_row(&shown, (first, y), stride, pixels);
                 }
             }
         });
+    }
+
+    /// Interpolates a row of a window.
+    fn interpolate_row(
+        &self,
+        shown: &[[f32; 3]],
+        (first, y): (u32, u32),
+        stride: u32,
+        pixels: &mut [[f32; 3]],
+    ) {
+        let [width, height] = self.size;
+        let [above, below] = around(y, stride, height);
+        let down = share(y, above, stride);
+        let column = |x: u32| {
+            let [a, b] = [above, below].map(|y| shown[(y * width + x) as usize]);
+            [0, 1, 2].map(|channel| a[channel] + down * (b[channel] - a[channel]))
+        };
+        let mut ends = around(first, stride, width);
+        let mut colors = ends.map(column);
+        for (x, pixel) in (first..).zip(pixels) {
+            let found = around(x, stride, width);
+            if found != ends {
+                ends = found;
+                colors = ends.map(column);
+            }
+            let right = share(x, ends[0], stride);
+            *pixel = [0, 1, 2]
+                .map(|channel| colors[0][channel] + right * (colors[1][channel] - colors[0][channel]));
+        }
     }
 
     /// What strides would lose in the windows of a picture that was drawn with these.
@@ -153,11 +157,18 @@ impl Windows {
     }
 }
 
-/// The pixel with a ray before another, or its own, along an axis; and how far the other is behind it.
-fn around(pixel: u32, stride: u32) -> (i64, i64) {
-    let (pixel, stride) = (i64::from(pixel), i64::from(stride));
-    let behind = (pixel - stride / 2).rem_euclid(stride);
-    (pixel - behind, behind)
+/// The pixels with a ray around another along an axis of so many: at the edges twice the same.
+fn around(pixel: u32, stride: u32, num: u32) -> [u32; 2] {
+    let half = stride / 2;
+    let before = (pixel + half) / stride * stride;
+    let last = num - 1;
+    // Where the last square's ray is beyond the edge, all of it came in its colour.
+    [before.checked_sub(half).unwrap_or(half), before + half].map(|place| place.min(last))
+}
+
+/// How far a pixel is on the way from one with a ray to the next.
+fn share(pixel: u32, before: u32, stride: u32) -> f32 {
+    pixel.saturating_sub(before) as f32 / stride as f32
 }
 
 /// A picture of fewer pixels as one of more, colours interpolated between the middles of pixels.
@@ -180,4 +191,77 @@ pub(super) fn enlarge(image: &Image, [width, height]: [u32; 2]) -> Image {
         })
     };
     Image { width, height, pixels: (0..height).flat_map(row).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture as a backend draws it: squares in the colour of one of their pixels.
+    fn drawn(windows: &Windows, strides: &[u32], color: impl Fn([u32; 2]) -> f32) -> Image {
+        let [width, height] = windows.size;
+        let pixel = |place: u32| {
+            let at = [place % width, place / width];
+            let stride = windows.stride_at(strides, at);
+            [color(at.map(|place| place / stride * stride + stride / 2)); 3]
+        };
+        Image { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+
+    #[test]
+    fn a_ramp_is_interpolated_exactly_but_for_the_edges() {
+        let ramp = |[x, y]: [u32; 2]| 0.25 * x as f32 - 0.125 * y as f32;
+        for size in [[200, 136], [131, 97], [33, 300], [7, 5]] {
+            let windows = Windows::new(size);
+            for stride in STRIDES {
+                let strides = vec![stride; windows.num() as usize];
+                let mut image = drawn(&windows, &strides, ramp);
+                windows.interpolate(&mut image, &strides);
+                let inner = |place: u32, num: u32| place >= stride / 2 && place + stride < num;
+                for (place, pixel) in (0..).zip(&image.pixels) {
+                    let at = [place % size[0], place / size[0]];
+                    if inner(at[0], size[0]) && inner(at[1], size[1]) {
+                        assert_eq!(pixel[0], ramp(at), "stride {stride}, {at:?} of {size:?}");
+                    }
+                    assert!(pixel[0].is_finite());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn windows_with_a_ray_for_each_pixel_stay_as_they_are() {
+        let windows = Windows::new([160, 160]);
+        let noise = |[x, y]: [u32; 2]| ((x * 7919 + y * 104_729) % 97) as f32;
+        let strides: Vec<u32> = (0..windows.num()).map(|window| 1 << (window % 4)).collect();
+        let mut image = drawn(&windows, &strides, noise);
+        let before = image.clone();
+        windows.interpolate(&mut image, &strides);
+        for window in (0..windows.num()).filter(|window| window % 4 == 0) {
+            let [[x0, y0], [x1, y1]] = windows.bounds(window);
+            for place in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (y * 160 + x) as usize)) {
+                assert_eq!(image.pixels[place], before.pixels[place]);
+            }
+        }
+        assert_ne!(image, before);
+    }
+
+    #[test]
+    fn losses_are_those_of_the_details_that_are_there() {
+        let windows = Windows::new([256, 256]);
+        let all = |stride: u32| vec![stride; windows.num() as usize];
+        let loss = |color: &dyn Fn([u32; 2]) -> f32, stride: u32| {
+            windows.losses(&drawn(&windows, &all(stride), color), &all(stride))[0]
+        };
+        // Nothing is lost of a ramp but what is always taken to be; of stripes as much by any stride.
+        let ramp = loss(&|[x, _]| 0.001 * x as f32, 1);
+        assert!(ramp.iter().all(|&loss| loss < 0.01), "{ramp:?}");
+        let stripes = loss(&|[x, _]| (x % 2) as f32, 1);
+        assert!(stripes[1] > 0.3, "{stripes:?}");
+        // Losses grow with the stride, and what was not drawn is foreseen from what was.
+        for drawn in STRIDES {
+            let waves = loss(&|[x, y]| (0.05 * x as f32).sin() + (0.07 * y as f32).cos(), drawn);
+            assert!(waves.windows(2).skip(1).all(|pair| pair[0] <= pair[1]), "{drawn}: {waves:?}");
+        }
+    }
 }
