@@ -155,6 +155,12 @@ impl Scheduler {
         &self.model
     }
 
+    /// Says that the view moved, where neither importance nor work of items tells: levels that rest settled on are given
+    /// up.
+    pub fn disturb(&mut self) {
+        self.rest = Rest::default();
+    }
+
     /// What is expected outside of parts, such as reading the picture back.
     pub fn outside_secs(&self) -> f64 {
         self.outside.expected_secs()

@@ -84,6 +84,9 @@ fn scene<D: Data>(
             let secs = start.elapsed().as_secs_f64();
             errors.push(secs / budget_secs - 1.0);
             if let Some(paced) = picture.report.frames[0].paced {
+                if std::env::var("EACH").is_ok() && frame % 8 == 0 {
+                    println!("{frame} {:.1} of {:.1} {paced:?}", secs * 1e3, budget_secs * 1e3);
+                }
                 control += paced.control_seconds / secs;
                 rays += paced.rays_per_pixel;
                 floor += usize::from(paced.is_at_floor);

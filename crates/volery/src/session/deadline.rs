@@ -54,6 +54,9 @@ const FIRST_SECS_PER_BYTE: f64 = 2e-9;
 /// What larger pixels of whole pictures are, in pixels.
 const SHRINKS: [u32; 2] = [2, 4];
 
+/// What rays far apart take more, in rays for each pixel: neighbours walk through much in common.
+const APART: f64 = 0.08;
+
 /// Share of the picture's diagonal at which a gaze counts half.
 const GAZE_RADIUS: f64 = 0.1;
 
@@ -217,7 +220,12 @@ impl<D: Data> Session<D> {
         let (plan, rung, uploaded) = self.resident_plan(view, deadline.budget_secs, pace, backend)?;
         let windows = pace.windows;
         let levels = pace.levels();
-        watch.control(|_| pace.scheduler.begin(deadline.budget_secs, &pace.items(&levels, deadline)));
+        watch.control(|_| {
+            if pace.camera != Some(view.camera) {
+                pace.scheduler.disturb();
+            }
+            pace.scheduler.begin(deadline.budget_secs, &pace.items(&levels, deadline));
+        });
         backend.begin_windows(&picture_view(view), windows.side)?;
         let content = plan.drawing.content();
         let mut strides = vec![MAX_STRIDE; windows.num() as usize];
@@ -337,17 +345,11 @@ impl Pace {
     /// The levels of all windows, one after the other.
     fn levels(&self) -> Vec<Level> {
         let level = |window: u32, place: usize| {
-            let loss = self
-                .losses
-                .as_ref()
-                .map_or(f64::from(STRIDES[place] - 1), |losses| losses[window as usize][place]);
+            let [pixels, rays] = [1, STRIDES[place]].map(|stride| self.windows.num_rays(window, stride));
+            let loss = self.losses.as_ref().map(|losses| losses[window as usize][place]);
+            let loss = if place == 0 { 0.0 } else { loss.unwrap_or(place as f64) };
             // What counts is the sum of squares over pixels.
-            let error = self.windows.num_rays(window, 1) * loss.powi(2);
-            Level {
-                work: self.windows.num_rays(window, STRIDES[place]),
-                bytes: 0.0,
-                error: if place == 0 { 0.0 } else { error },
-            }
+            Level { work: rays + APART * pixels, bytes: 0.0, error: pixels * loss.powi(2) }
         };
         (0..self.windows.num())
             .flat_map(|window| (0..STRIDES.len()).map(move |place| level(window, place)))

@@ -6,8 +6,8 @@
 //! shows beyond the edge is a value there as good as another.
 //!
 //! What a stride loses in a window is foreseen from the last picture, by how far the middle of `stride` pixels is from
-//! the mean of the two ends. Of finer details than a window showed nothing is known: they are taken to lose half of what
-//! the next coarser ones lose, as edges do.
+//! the mean of the two ends. Of finer details than a window showed nothing is known: at an edge half the stride loses
+//! the root of half as much, and so it is taken to do.
 
 use rayon::prelude::*;
 use volery_frame::Image;
@@ -19,8 +19,11 @@ pub(super) const STRIDES: [u32; 4] = [1, 2, 4, MAX_STRIDE];
 /// Windows that a picture should have: fewer are shared out too coarsely, of more each costs more than its rays.
 const NUM_WINDOWS: f64 = 64.0;
 
-/// What a window may lose at least by any stride: one step of a screen's colours.
-const LEAST_LOSS: f64 = 1.0 / 512.0;
+/// What a window is taken to lose at least by any stride.
+const LEAST_LOSS: f64 = 1.0 / 2048.0;
+
+/// What half the stride loses at an edge: half as many pixels are off by as much.
+const FINER: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// The squares that a picture is cut into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,18 +118,13 @@ impl Windows {
     /// What strides would lose in the windows of a picture that was drawn with these.
     pub(super) fn losses(&self, image: &Image, strides: &[u32]) -> Vec<Losses> {
         let losses = |window: u32| {
-            let mut losses = [0.0; STRIDES.len()];
             let drawn = strides[window as usize];
+            let mut coarser = self.loss(image, window, 2 * MAX_STRIDE);
+            let mut losses = [0.0; STRIDES.len()];
             for (loss, &stride) in losses.iter_mut().zip(&STRIDES).rev() {
-                *loss = if stride > drawn { self.loss(image, window, stride) } else { 0.0 };
-            }
-            // From the coarsest that is known on.
-            for level in (1..STRIDES.len()).rev() {
-                if STRIDES[level] <= drawn {
-                    losses[level] =
-                        losses.get(level + 1).map_or(LEAST_LOSS * f64::from(drawn), |coarser| 0.5 * coarser);
-                }
-                losses[level] = losses[level].max(LEAST_LOSS * f64::from(STRIDES[level]).sqrt());
+                let found = if stride > drawn { self.loss(image, window, stride) } else { FINER * coarser };
+                coarser = found.max(LEAST_LOSS);
+                *loss = coarser;
             }
             losses
         };
@@ -255,7 +253,7 @@ mod tests {
         };
         // Nothing is lost of a ramp but what is always taken to be; of stripes as much by any stride.
         let ramp = loss(&|[x, _]| 0.001 * x as f32, 1);
-        assert!(ramp.iter().all(|&loss| loss < 0.01), "{ramp:?}");
+        assert!(ramp.iter().all(|&loss| loss < 0.001), "{ramp:?}");
         let stripes = loss(&|[x, _]| (x % 2) as f32, 1);
         assert!(stripes[1] > 0.3, "{stripes:?}");
         // Losses grow with the stride, and what was not drawn is foreseen from what was.
