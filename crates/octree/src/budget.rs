@@ -22,25 +22,29 @@
 //!    points let in. Every vertex is a cut. Steps of one slope stay apart, so that a budget between them is used. All
 //!    budgets share one hull.
 //! 2. *Cut* ([`Tradeoff::cut`]). The last vertex of the root's hull that fits is an optimum for its own bytes. The line
-//!    to the next bounds what any cut can do with what is left, and so how much would be gained at most. Is that more
-//!    than [`GAP`] of the error, the cuts above the line, but below the corner of the two vertices, are searched.
-//! 3. *Gap.* With the line's slope as price of a byte, a choice costs its error and its bytes; what it costs more than
-//!    the best of its subtree adds up over the tree, and what exceeds the height of the gap cannot be part of a better
-//!    cut. Nor can what leaves too few bytes for the rest. Few choices remain; their points are listed from the
+//!    to the next bounds what any cut can do with what is left, and so how much could be gained.
+//! 3. *Gap.* Two neighbours among the vertices differ in one subtree only. Between them come first the points that this
+//!    subtree's hull leaves out: its other resolutions, and what its children do together. Where a budget could still
+//!    gain more than [`GAP`] of its error, the cuts above the line, but below the corner of the two vertices, are
+//!    searched.
+//! 4. *Search.* With the line's slope as price of a byte, a choice costs its error and its bytes; what it costs more
+//!    than the best of its subtree adds up over the tree, and what exceeds the height of the corner cannot be part of a
+//!    better cut. Nor can what leaves too few bytes for the rest. Few choices remain; their points are listed from the
 //!    leaves up, without those that others beat in both. At most [`MAX_POINTS`] are kept of a subtree, those nearest to
-//!    the line.
+//!    the line; and after a fixed number of steps the rest of the tree stays as the price of a byte has it.
 //!
 //! # Guarantees
-//! - Never above the budget. The error is below that of the optimum's bound by [`GAP`] of it at most, or the best that
-//!   the search found; it *is* the optimum where no list was cut off. [`Budgeted::lower_bound`] says how far it is.
-//! - More bytes never give a larger error. Proof: budgets that have the same last vertex choose from the same list,
-//!   as neither list nor slope depends on the budget but by the vertex; more bytes, more of the list. Every point of
-//!   the list is on or above the line, so above the next vertex, which is where the larger budgets begin. It holds to
-//!   the bit, because errors are integers (below).
+//! - Never above the budget. [`Budgeted::lower_bound`] says how near the optimum an answer is. It is the optimum where
+//!   the search was not cut off, and within [`GAP`] of it where none was needed.
+//! - More bytes never give a larger error. Proof: budgets that have the same last vertex choose from the same list, as
+//!   nothing in steps 3 and 4 depends on the budget but by the vertex; more bytes, more of the list. Every point of the
+//!   list is a cut, so on or above the line, and has fewer bytes than the next vertex: so its error is above that one's,
+//!   where the larger budgets begin. It holds to the bit, because errors are integers (below).
 //! - Bytes that improve nothing are not spent: a homogeneous node is held at the coarsest resolution that is as good
 //!   as any. A budget above everything gives the least error there is.
-//! - The same bits whatever asks and however often: plain recursion, in the order of the tree.
-//! - Time and memory are linear in the prices, times the levels, for the hull (`benches/budget.rs`).
+//! - The same bits whatever was asked before: plain recursion, in the order of the tree.
+//! - Time and memory of the hull are linear in the prices, times the levels; those of a cut are bounded
+//!   (`benches/budget.rs`).
 //!
 //! *Errors are integers.* Sums of `f64` depend on their order, and convexity is lost to rounding. Errors count in a unit
 //! that is a power of two and about `2^-60` of the sum of the largest errors of all nodes, rounded up so that none but 0
@@ -59,10 +63,12 @@
 mod fixed;
 mod gap;
 mod hull;
+mod search;
 
 use volery_pyramid::{Layout, Node};
 
 use fixed::Scale;
+use gap::Gap;
 use hull::{Hulls, Prices};
 
 /// A gain below this part of the error is not searched for.
@@ -163,22 +169,17 @@ impl Tradeoff {
         let Some(vertex) = root.last_within(max_bytes) else {
             return Err(BudgetTooSmall { max_bytes, min_bytes: root.first.bytes });
         };
-        let mut held = Vec::new();
-        let at = root.point(vertex);
+        let (at, mut held) = (root.point(vertex), Vec::new());
         let (point, lower_bound) = match root.step(vertex) {
             None => {
-                self.hulls.take(&self.layout, self.layout.root(), vertex, &mut held);
+                self.hulls.take(&self.layout, self.layout.root(), vertex, None, &mut held);
                 (at, at.error)
             }
-            Some(step) if step.error as f64 <= GAP * (at.error - step.error) as f64 => {
-                self.hulls.take(&self.layout, self.layout.root(), vertex, &mut held);
-                (at, at.error - step.gain(max_bytes - at.bytes))
-            }
             Some(step) => {
-                let found = gap::search(self, vertex);
-                let point = found.take(self, max_bytes, &mut held);
-                let bound = at.error - step.gain(max_bytes - at.bytes);
-                (point, if found.is_whole { point.error } else { bound })
+                let gap = Gap::after(self, vertex);
+                let point = gap.take(self, max_bytes, &mut held);
+                let line = at.error - step.gain(max_bytes - at.bytes);
+                (point, if gap.is_whole { point.error } else { line })
             }
         };
         let [error, lower_bound] = [point.error, lower_bound].map(|units| self.scale.error_of(units));

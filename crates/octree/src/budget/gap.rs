@@ -1,176 +1,84 @@
-//! The cuts between two vertices of the root's hull: those in the corner that the line between them cuts off.
+//! What can be bought on the way from a vertex of the root's hull to the next.
 
-use volery_pyramid::Node;
+use super::GAP;
+use super::hull::{Inside, Point, Step};
+use super::search::{self, Cuts};
+use super::{Held, Tradeoff};
 
-use super::hull::{Point, Step};
-use super::{Held, MAX_POINTS, Tradeoff};
-
-/// What can be bought on the way from a vertex of the root's hull to the next.
-pub(super) struct Found {
+/// The cuts between two vertices of the root's hull, as far as they are known.
+pub(super) struct Gap {
     vertex: usize,
-    /// Bytes rising, errors falling.
-    listed: Vec<Listed>,
-    picks: Vec<Pick>,
+    /// The part of the tree in which the two vertices differ.
+    inside: Inside,
+    /// Bytes rising, errors falling; first the vertex itself.
+    listed: Vec<(Point, Way)>,
+    searched: Cuts,
     /// Whether these are all that no other beats.
     pub(super) is_whole: bool,
 }
 
-/// A cut of a subtree.
+/// How to come to a cut.
 #[derive(Clone, Copy)]
-struct Listed {
-    point: Point,
-    pick: usize,
+enum Way {
+    Vertex,
+    /// The vertex, with one of the points that the hull of the part leaves out.
+    Inside(usize),
+    /// One of the cuts of a search.
+    Searched(usize),
 }
 
-/// What a cut is made of: places in a list of these.
-#[derive(Clone, Copy)]
-enum Pick {
-    Nothing,
-    Held(Held),
-    /// The first comes first in canonical order.
-    Both(usize, usize),
-}
+impl Gap {
+    /// Lists the cuts that are better than a vertex and take fewer bytes than the next.
+    pub(super) fn after(tradeoff: &Tradeoff, vertex: usize) -> Self {
+        let root = tradeoff.hulls.root();
+        let (from, step) = (root.point(vertex), *root.step(vertex).expect("a vertex before the last"));
+        let inside = tradeoff.hulls.inside(&tradeoff.layout, &tradeoff.prices, vertex);
+        let mut listed = vec![(from, Way::Vertex)];
+        listed.extend((0..).zip(&inside.points).map(|(place, &(point, _))| {
+            let bytes = from.bytes + (point.bytes - inside.from.bytes);
+            let error = from.error - (inside.from.error - point.error);
+            (Point { bytes, error }, Way::Inside(place))
+        }));
+        let mut gap = Self { vertex, inside, listed, searched: Cuts::default(), is_whole: false };
+        if !gap.is_near(from, &step) {
+            gap.searched = search::cuts(tradeoff, from, step);
+            gap.is_whole = gap.searched.is_whole;
+            let found = (0..).zip(&gap.searched.listed).map(|(place, cut)| (cut.point, Way::Searched(place)));
+            gap.listed.extend(found);
+            // Stable: of equal cuts the first stays.
+            gap.listed.sort_by_key(|(point, _)| (point.bytes, point.error));
+            let mut least = u64::MAX;
+            gap.listed.retain(|(point, _)| {
+                let is_better = point.error < least;
+                least = least.min(point.error);
+                is_better
+            });
+        }
+        gap
+    }
 
-/// What a part of a cut may take without making the whole useless.
-#[derive(Clone, Copy)]
-struct Room {
-    /// Of the part; it may have as many.
-    bytes: u64,
-    /// What it may cost more than the best of its subtree; it must be below.
-    excess: u128,
-}
+    /// Whether no budget on the way would gain by a search more than a part [`GAP`] of its error.
+    fn is_near(&self, from: Point, step: &Step) -> bool {
+        let ends = self.listed[1..].iter().map(|(point, _)| point.bytes).chain([from.bytes + step.bytes]);
+        self.listed.iter().zip(ends).all(|((point, _), end)| {
+            let bound = from.error - step.gain(end - from.bytes);
+            (point.error - bound) as f64 <= GAP * bound as f64
+        })
+    }
 
-/// Lists the cuts that fewer bytes than those of the next vertex can buy, and that are better than a vertex.
-pub(super) fn search(tradeoff: &Tradeoff, vertex: usize) -> Found {
-    let root = tradeoff.hulls.root();
-    let step = *root.step(vertex).expect("a vertex before the last");
-    let from = root.point(vertex);
-    let mut search = Search { tradeoff, step, picks: vec![Pick::Nothing], is_whole: true };
-    // At the corner, that is at the bytes of the next vertex and the error of this one, a point costs this much more.
-    let excess = u128::from(step.bytes) * u128::from(step.error);
-    let mut listed = search.list(tradeoff.layout.root(), Room { bytes: from.bytes + step.bytes - 1, excess });
-    listed.retain(|cut| cut.point.error < from.error);
-    Found { vertex, listed, picks: search.picks, is_whole: search.is_whole }
-}
-
-impl Found {
-    /// Lists what the best cut within a budget holds; the vertex itself if there is none better.
+    /// Lists what the best cut within a budget holds. The budget is that of the vertex at least.
     pub(super) fn take(&self, tradeoff: &Tradeoff, max_bytes: u64, held: &mut Vec<Held>) -> Point {
-        let num_within = self.listed.partition_point(|cut| cut.point.bytes <= max_bytes);
-        match num_within.checked_sub(1) {
-            Some(best) => {
-                self.unfold(self.listed[best].pick, held);
-                self.listed[best].point
+        let num_within = self.listed.partition_point(|(point, _)| point.bytes <= max_bytes);
+        let (point, way) = self.listed[num_within - 1];
+        let replaced = match way {
+            Way::Vertex => None,
+            Way::Inside(place) => Some((self.inside.node, self.inside.points[place].1)),
+            Way::Searched(place) => {
+                self.searched.take(tradeoff, place, held);
+                return point;
             }
-            None => {
-                let layout = &tradeoff.layout;
-                tradeoff.hulls.take(layout, layout.root(), self.vertex, held);
-                tradeoff.hulls.root().point(self.vertex)
-            }
-        }
-    }
-
-    fn unfold(&self, pick: usize, held: &mut Vec<Held>) {
-        match self.picks[pick] {
-            Pick::Nothing => {}
-            Pick::Held(one) => held.push(one),
-            Pick::Both(first, second) => {
-                self.unfold(first, held);
-                self.unfold(second, held);
-            }
-        }
-    }
-}
-
-struct Search<'a> {
-    tradeoff: &'a Tradeoff,
-    /// Its slope is the price of a byte.
-    step: Step,
-    picks: Vec<Pick>,
-    is_whole: bool,
-}
-
-impl Search<'_> {
-    fn cost(&self, point: Point) -> u128 {
-        u128::from(self.step.bytes) * u128::from(point.error)
-            + u128::from(self.step.error) * u128::from(point.bytes)
-    }
-
-    /// The least cost of a subtree, and its fewest bytes; none if it cannot be held.
-    fn least(&self, node: Node) -> Option<(u128, u64)> {
-        let hull = self.tradeoff.hulls.of(&self.tradeoff.layout, node)?;
-        Some((self.cost(hull.point(hull.best_at(&self.step))), hull.first.bytes))
-    }
-
-    /// The cuts of a subtree that have room, without those that others beat.
-    fn list(&mut self, node: Node, room: Room) -> Vec<Listed> {
-        let Some((least, _)) = self.least(node) else { return Vec::new() };
-        let mut cuts = Vec::new();
-        for choice in self.tradeoff.prices.of(&self.tradeoff.layout, node) {
-            if choice.point.bytes <= room.bytes && self.cost(choice.point) - least < room.excess {
-                let held = Held { node, resolution: choice.resolution };
-                cuts.push((choice.point, Pick::Held(held)));
-            }
-        }
-        self.list_split(node, least, room, &mut cuts);
-        self.keep(cuts)
-    }
-
-    /// The cuts of a subtree by its children, added to a list.
-    fn list_split(&mut self, node: Node, least: u128, room: Room, cuts: &mut Vec<(Point, Pick)>) {
-        let layout = &self.tradeoff.layout;
-        let children: Vec<Node> = layout.children(node).collect();
-        let Some(leasts) = children.iter().map(|&child| self.least(child)).collect::<Option<Vec<_>>>() else {
-            return;
         };
-        let fewest_bytes: u64 = leasts.iter().map(|&(_, bytes)| bytes).sum();
-        let least_split: u128 = leasts.iter().map(|&(cost, _)| cost).sum();
-        if children.is_empty() || fewest_bytes > room.bytes || least_split - least >= room.excess {
-            return;
-        }
-        let excess = room.excess - (least_split - least);
-        let spare = room.bytes - fewest_bytes;
-        let mut joined = vec![Listed { point: Point { bytes: 0, error: 0 }, pick: 0 }];
-        let (mut joined_least, mut joined_bytes) = (0, 0);
-        for (place, (&child, (least, fewest))) in children.iter().zip(leasts).enumerate() {
-            let listed = self.list(child, Room { bytes: fewest + spare, excess });
-            joined_least += least;
-            joined_bytes += fewest;
-            let mut pairs = Vec::with_capacity(joined.len() * listed.len());
-            for a in &joined {
-                for b in &listed {
-                    let point = a.point.plus(b.point);
-                    if point.bytes <= joined_bytes + spare && self.cost(point) - joined_least < excess {
-                        pairs.push((point, Pick::Both(a.pick, b.pick)));
-                    }
-                }
-            }
-            if place + 1 == children.len() {
-                cuts.append(&mut pairs);
-            } else {
-                joined = self.keep(pairs);
-            }
-        }
-    }
-
-    /// Those that no other beats, of these the [`MAX_POINTS`] of the least cost; bytes rising, errors falling.
-    fn keep(&mut self, mut cuts: Vec<(Point, Pick)>) -> Vec<Listed> {
-        // Stable: of equal points the first stays.
-        cuts.sort_by_key(|(point, _)| (point.bytes, point.error));
-        let mut least = u64::MAX;
-        cuts.retain(|(point, _)| {
-            let is_better = point.error < least;
-            least = least.min(point.error);
-            is_better
-        });
-        if cuts.len() > MAX_POINTS {
-            self.is_whole = false;
-            cuts.sort_by_key(|&(point, _)| (self.cost(point), point.bytes));
-            cuts.truncate(MAX_POINTS);
-            cuts.sort_by_key(|(point, _)| point.bytes);
-        }
-        let first = self.picks.len();
-        self.picks.extend(cuts.iter().map(|&(_, pick)| pick));
-        (first..).zip(cuts).map(|(pick, (point, _))| Listed { point, pick }).collect()
+        tradeoff.hulls.take(&tradeoff.layout, tradeoff.layout.root(), self.vertex, replaced, held);
+        point
     }
 }

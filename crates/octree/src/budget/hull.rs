@@ -131,9 +131,9 @@ fn num_finest(layout: &Layout, node: Node) -> u64 {
     along(0) * along(1) * along(2)
 }
 
-/// Where a vertex of a hull comes from.
+/// Where a point of a subtree comes from.
 #[derive(Clone, Copy, Debug)]
-enum Origin {
+pub(super) enum Origin {
     /// The node itself, held at a resolution.
     Own(u32),
     /// Its children, after this many of their merged steps.
@@ -331,23 +331,97 @@ impl Hulls {
         Some(node)
     }
 
-    /// Lists what a vertex of a subtree's hull holds, in canonical order.
-    pub(super) fn take(&self, layout: &Layout, node: Node, vertex: usize, held: &mut Vec<Held>) {
+    /// Lists what a vertex of a subtree's hull holds, in canonical order; one node's part from elsewhere than its hull.
+    pub(super) fn take(
+        &self,
+        layout: &Layout,
+        node: Node,
+        vertex: usize,
+        replaced: Option<(Node, Origin)>,
+        held: &mut Vec<Held>,
+    ) {
         let hull = self.of(layout, node).expect("a hull with a vertex");
-        match hull.origin(vertex) {
+        let origin = match replaced {
+            Some((other, origin)) if other == node => origin,
+            _ => hull.origin(vertex),
+        };
+        match origin {
             Origin::Own(resolution) => held.push(Held { node, resolution }),
             Origin::Split(num_steps) => {
-                let takers = self.levels[node.level as usize].takers.get(layout.node_index(node));
                 let mut vertices = [0; 8];
-                for &place in &takers[..num_steps as usize] {
+                for &place in &self.takers(layout, node)[..num_steps as usize] {
                     vertices[usize::from(place)] += 1;
                 }
                 for (child, vertex) in layout.children(node).zip(vertices) {
-                    self.take(layout, child, vertex, held);
+                    self.take(layout, child, vertex, replaced, held);
                 }
             }
         }
     }
+
+    fn takers(&self, layout: &Layout, node: Node) -> &[u8] {
+        self.levels[node.level as usize].takers.get(layout.node_index(node))
+    }
+
+    /// What is between a vertex of the root's hull and the next.
+    pub(super) fn inside(&self, layout: &Layout, prices: &Prices, vertex: usize) -> Inside {
+        let (mut node, mut vertex) = (layout.root(), vertex);
+        // Down to the one subtree that takes the step.
+        let hull = loop {
+            let hull = self.of(layout, node).expect("a hull with a vertex");
+            match (hull.origin(vertex), hull.origin(vertex + 1)) {
+                (Origin::Split(first), Origin::Split(second)) if second == first + 1 => {
+                    let (before, place) = (first as usize, self.takers(layout, node)[first as usize]);
+                    vertex =
+                        self.takers(layout, node)[..before].iter().filter(|&&other| other == place).count();
+                    node =
+                        layout.children(node).nth(usize::from(place)).expect("the child that takes the step");
+                }
+                _ => break hull,
+            }
+        };
+        let (from, to) = (hull.point(vertex), hull.point(vertex + 1));
+        let own = prices.of(layout, node).iter();
+        let mut points: Vec<_> = own.map(|choice| (choice.point, Origin::Own(choice.resolution))).collect();
+        self.splits(layout, node, |point, count| points.push((point, Origin::Split(count))));
+        points.retain(|(point, _)| (from.bytes..to.bytes).contains(&point.bytes));
+        // Stable: of equal points the first stays.
+        points.sort_by_key(|(point, _)| (point.bytes, point.error));
+        let mut least = from.error;
+        points.retain(|(point, _)| {
+            let is_better = point.error < least;
+            least = least.min(point.error);
+            is_better
+        });
+        Inside { node, from, points }
+    }
+
+    /// Visits the vertices of all children together, if there are, with the number of steps to each.
+    fn splits(&self, layout: &Layout, node: Node, mut visit: impl FnMut(Point, u32)) {
+        if node.level == 0 {
+            return;
+        }
+        let hulls: Option<Vec<_>> = layout.children(node).map(|child| self.of(layout, child)).collect();
+        let Some(hulls) = hulls else { return };
+        let mut point = hulls.iter().fold(Point { bytes: 0, error: 0 }, |sum, hull| sum.plus(hull.first));
+        visit(point, 0);
+        let mut steps: Vec<_> = hulls.iter().map(|hull| hull.steps.iter()).collect();
+        for (count, &place) in (1..).zip(self.takers(layout, node)) {
+            let step = steps[usize::from(place)].next().expect("as many steps as it takes");
+            point = Point { bytes: point.bytes + step.bytes, error: point.error - step.error };
+            visit(point, count);
+        }
+    }
+}
+
+/// The points that a subtree's hull leaves out, between two vertices.
+#[derive(Clone, Debug)]
+pub(super) struct Inside {
+    pub(super) node: Node,
+    /// The first of the two vertices.
+    pub(super) from: Point,
+    /// Of its own resolutions and of its children together; bytes rising, errors falling, all better than `from`.
+    pub(super) points: Vec<(Point, Origin)>,
 }
 
 impl Level {

@@ -1,5 +1,7 @@
 //! Trees of the size in use: how near the optimum is known to be, and that bytes are used.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use volery_octree::{Price, Tradeoff};
 use volery_pyramid::{Kind, Layout, Node};
@@ -10,23 +12,24 @@ use crate::world::Noise;
 /// How far above the optimum an answer may be, from a 64th of the bytes.
 const NEAR: f64 = 0.01;
 
-/// A volume of `512^3` with a surface: errors grow with the distance of samples and fall with that from a shell, and
-/// every node differs.
+/// A volume with a surface: errors grow with the distance of samples and add up over the finest nodes inside a node, no
+/// two of which are equal.
 fn shell(layout: &Layout) -> crate::Prices {
     let mut noise = Noise(3);
-    crate::every_choice(layout)
-        .map(|(node, resolution)| ((node, resolution), price(layout, node, resolution, noise.unit())))
-        .collect()
-}
-
-fn price(layout: &Layout, node: Node, resolution: u32, noise: f64) -> Price {
-    let [low, high] = layout.bounds(node);
-    let half = (high - low).length() / 2.0;
-    let distance = (((low + high) / 2.0 - DVec3::splat(255.5)).length() - 180.0).abs();
-    let near = (-(distance - half).max(0.0) / 20.0).exp();
-    let area = half * half.min(20.0);
-    let error = near * area * (0.5 + noise) * (f64::from(1 << (2 * resolution)) - 1.0);
-    Price { bytes: layout.block_shape(node, resolution).num_samples() as u64, error }
+    let mut weights: HashMap<Node, f64> = HashMap::new();
+    for node in layout.level_nodes(0) {
+        let [low, high] = layout.bounds(node);
+        let distance = (((low + high) / 2.0 - DVec3::splat(255.5)).length() - 180.0).abs();
+        let weight = (-distance / 20.0).exp() * (0.5 + noise.unit());
+        for level in 0..layout.num_levels() {
+            *weights.entry(node.ancestor(level)).or_default() += weight;
+        }
+    }
+    let price = |(node, resolution): (Node, u32)| Price {
+        bytes: layout.block_shape(node, resolution).num_samples() as u64,
+        error: weights[&node] * (f64::from(1 << (2 * resolution)) - 1.0),
+    };
+    crate::every_choice(layout).map(|choice| (choice, price(choice))).collect()
 }
 
 #[test]

@@ -1,0 +1,193 @@
+//! A search of the cuts in the corner that a step of the root's hull cuts off.
+
+use volery_pyramid::Node;
+
+use super::hull::{Point, Step};
+use super::{Held, MAX_POINTS, Tradeoff};
+
+/// Pairs of cuts that are looked at in a search, or as many in nodes; then subtrees are no longer searched.
+const MAX_WORK: usize = 1 << 18;
+
+/// What a visit of a node costs beside its pairs, in pairs.
+const VISIT_WORK: usize = 32;
+
+/// Cuts of the whole tree.
+#[derive(Default)]
+pub(super) struct Cuts {
+    /// Bytes rising, errors falling.
+    pub(super) listed: Vec<Listed>,
+    picks: Vec<Pick>,
+    /// Whether these are all that no other beats.
+    pub(super) is_whole: bool,
+}
+
+/// A cut of a subtree.
+#[derive(Clone, Copy)]
+pub(super) struct Listed {
+    pub(super) point: Point,
+    pick: usize,
+}
+
+/// What a cut is made of: places in a list of these.
+#[derive(Clone, Copy)]
+enum Pick {
+    Nothing,
+    Held(Held),
+    /// A vertex of a subtree's hull.
+    Vertex(Node, usize),
+    /// The first comes first in canonical order.
+    Both(usize, usize),
+}
+
+/// What a part of a cut may take without making the whole useless.
+#[derive(Clone, Copy)]
+struct Room {
+    /// Of the part; it may have as many.
+    bytes: u64,
+    /// What it may cost more than the best of its subtree; it must be below.
+    excess: u128,
+}
+
+/// The least cost of a subtree.
+#[derive(Clone, Copy)]
+struct Least {
+    cost: u128,
+    /// A vertex that has it, and its point.
+    vertex: usize,
+    point: Point,
+    /// The fewest bytes of any cut of the subtree.
+    fewest_bytes: u64,
+}
+
+/// Lists the cuts better than a vertex of the root's hull, `from`, that take fewer bytes than the next, `step` away.
+pub(super) fn cuts(tradeoff: &Tradeoff, from: Point, step: Step) -> Cuts {
+    let mut search = Search { tradeoff, step, picks: vec![Pick::Nothing], work: 0, is_whole: true };
+    // At the corner, that is at the bytes of the next vertex and the error of this one, a point costs this much more.
+    let excess = u128::from(step.bytes) * u128::from(step.error);
+    let mut listed = search.list(tradeoff.layout.root(), Room { bytes: from.bytes + step.bytes - 1, excess });
+    listed.retain(|cut| cut.point.error < from.error);
+    Cuts { listed, picks: search.picks, is_whole: search.is_whole }
+}
+
+impl Cuts {
+    /// Lists what the cut at a place holds.
+    pub(super) fn take(&self, tradeoff: &Tradeoff, place: usize, held: &mut Vec<Held>) {
+        self.unfold(tradeoff, self.listed[place].pick, held);
+    }
+
+    fn unfold(&self, tradeoff: &Tradeoff, pick: usize, held: &mut Vec<Held>) {
+        match self.picks[pick] {
+            Pick::Nothing => {}
+            Pick::Held(one) => held.push(one),
+            Pick::Vertex(node, vertex) => tradeoff.hulls.take(&tradeoff.layout, node, vertex, None, held),
+            Pick::Both(first, second) => {
+                self.unfold(tradeoff, first, held);
+                self.unfold(tradeoff, second, held);
+            }
+        }
+    }
+}
+
+struct Search<'a> {
+    tradeoff: &'a Tradeoff,
+    /// Its slope is the price of a byte.
+    step: Step,
+    picks: Vec<Pick>,
+    /// Pairs looked at so far.
+    work: usize,
+    is_whole: bool,
+}
+
+impl Search<'_> {
+    fn cost(&self, point: Point) -> u128 {
+        let product = |x: u64, y: u64| u128::from(x) * u128::from(y);
+        product(self.step.bytes, point.error) + product(self.step.error, point.bytes)
+    }
+
+    /// None where the subtree cannot be held.
+    fn least(&self, node: Node) -> Option<Least> {
+        let hull = self.tradeoff.hulls.of(&self.tradeoff.layout, node)?;
+        let vertex = hull.best_at(&self.step);
+        let point = hull.point(vertex);
+        Some(Least { cost: self.cost(point), vertex, point, fewest_bytes: hull.first.bytes })
+    }
+
+    /// The cuts of a subtree that have room, without those that others beat.
+    fn list(&mut self, node: Node, room: Room) -> Vec<Listed> {
+        let Some(least) = self.least(node) else { return Vec::new() };
+        self.work += VISIT_WORK;
+        if self.work > MAX_WORK {
+            self.is_whole = false;
+            let best = (least.point, Pick::Vertex(node, least.vertex));
+            return self.keep(if least.point.bytes <= room.bytes { vec![best] } else { Vec::new() });
+        }
+        let mut cuts = Vec::new();
+        for choice in self.tradeoff.prices.of(&self.tradeoff.layout, node) {
+            if choice.point.bytes <= room.bytes && self.cost(choice.point) - least.cost < room.excess {
+                let held = Held { node, resolution: choice.resolution };
+                cuts.push((choice.point, Pick::Held(held)));
+            }
+        }
+        self.list_split(node, least.cost, room, &mut cuts);
+        self.keep(cuts)
+    }
+
+    /// The cuts of a subtree by its children, added to a list.
+    fn list_split(&mut self, node: Node, least: u128, room: Room, cuts: &mut Vec<(Point, Pick)>) {
+        let layout = &self.tradeoff.layout;
+        let children: Vec<Node> = layout.children(node).collect();
+        let Some(leasts) = children.iter().map(|&child| self.least(child)).collect::<Option<Vec<_>>>() else {
+            return;
+        };
+        let fewest_bytes: u64 = leasts.iter().map(|least| least.fewest_bytes).sum();
+        let least_split: u128 = leasts.iter().map(|least| least.cost).sum();
+        if children.is_empty() || fewest_bytes > room.bytes || least_split - least >= room.excess {
+            return;
+        }
+        let excess = room.excess - (least_split - least);
+        let spare = room.bytes - fewest_bytes;
+        let mut joined = vec![Listed { point: Point { bytes: 0, error: 0 }, pick: 0 }];
+        let (mut joined_least, mut joined_bytes) = (0, 0);
+        for (place, (&child, least)) in children.iter().zip(leasts).enumerate() {
+            let listed = self.list(child, Room { bytes: least.fewest_bytes + spare, excess });
+            self.work += joined.len() * listed.len();
+            joined_least += least.cost;
+            joined_bytes += least.fewest_bytes;
+            let mut pairs = Vec::with_capacity(joined.len() * listed.len());
+            for a in &joined {
+                for b in &listed {
+                    let point = a.point.plus(b.point);
+                    if point.bytes <= joined_bytes + spare && self.cost(point) - joined_least < excess {
+                        pairs.push((point, Pick::Both(a.pick, b.pick)));
+                    }
+                }
+            }
+            if place + 1 == children.len() {
+                cuts.append(&mut pairs);
+            } else {
+                joined = self.keep(pairs);
+            }
+        }
+    }
+
+    /// Those that no other beats, of these the [`MAX_POINTS`] of the least cost; bytes rising, errors falling.
+    fn keep(&mut self, mut cuts: Vec<(Point, Pick)>) -> Vec<Listed> {
+        // Stable: of equal points the first stays.
+        cuts.sort_by_key(|(point, _)| (point.bytes, point.error));
+        let mut least = u64::MAX;
+        cuts.retain(|(point, _)| {
+            let is_better = point.error < least;
+            least = least.min(point.error);
+            is_better
+        });
+        if cuts.len() > MAX_POINTS {
+            self.is_whole = false;
+            cuts.sort_by_key(|&(point, _)| (self.cost(point), point.bytes));
+            cuts.truncate(MAX_POINTS);
+            cuts.sort_by_key(|(point, _)| point.bytes);
+        }
+        let first = self.picks.len();
+        self.picks.extend(cuts.iter().map(|&(_, pick)| pick));
+        (first..).zip(cuts).map(|(pick, (point, _))| Listed { point, pick }).collect()
+    }
+}
