@@ -6,7 +6,7 @@ use super::hull::{Point, Step};
 use super::{Held, MAX_POINTS, Tradeoff};
 
 /// Pairs of cuts that are looked at in a search, or as many in nodes; then subtrees are no longer searched.
-const MAX_WORK: usize = 1 << 18;
+const MAX_WORK: usize = 1 << 17;
 
 /// What a visit of a node costs beside its pairs, in pairs.
 const VISIT_WORK: usize = 32;
