@@ -12,6 +12,9 @@ use crate::world::Noise;
 /// How far above the optimum an answer may be, from a 64th of the bytes.
 const NEAR: f64 = 0.01;
 
+/// The same with fewer bytes, where a step of the root is a large part of all that there is.
+const NEAR_THE_ROOT: f64 = 0.15;
+
 /// A volume with a surface: errors grow with the distance of samples and add up over the finest nodes inside a node, no
 /// two of which are equal.
 fn shell(layout: &Layout) -> crate::Prices {
@@ -46,7 +49,7 @@ fn near_the_optimum_from_a_thousandth_of_the_bytes_to_all() {
         let max_bytes = (tradeoff.max_bytes() as f64 * share) as u64;
         let found = tradeoff.cut(max_bytes.max(tradeoff.min_bytes())).expect("enough");
         check(&layout, &prices, &found, max_bytes.max(tradeoff.min_bytes()));
-        let above = found.error / found.lower_bound.max(1e-300) - 1.0;
+        let above = if found.error > found.lower_bound { found.error / found.lower_bound - 1.0 } else { 0.0 };
         println!(
             "share {share:.4}: {} nodes, {:.3} of the bytes, error {:.4e}, at most {:.3} % above the optimum",
             found.held.len(),
@@ -54,7 +57,8 @@ fn near_the_optimum_from_a_thousandth_of_the_bytes_to_all() {
             found.error,
             above * 100.0
         );
-        assert!(found.error <= last && (share < 1.0 / 64.0 || above <= NEAR));
+        let threshold = if share < 1.0 / 64.0 { NEAR_THE_ROOT } else { NEAR };
+        assert!(found.error <= last && above <= threshold, "threshold {threshold}");
         last = found.error;
     }
 }

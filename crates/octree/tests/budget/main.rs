@@ -62,6 +62,7 @@ pub(crate) fn tradeoff(layout: &Layout, prices: &Prices) -> Tradeoff {
 }
 
 /// Checks all that an answer says of itself: that it is a cut, and its bytes and error those of what it holds.
+#[track_caller]
 pub(crate) fn check(layout: &Layout, prices: &Prices, found: &Budgeted, max_bytes: u64) {
     let cut = Cut { nodes: found.held.iter().map(|held| held.node).collect(), skipped: Vec::new() };
     assert_eq!(defects(layout, &cut), []);
@@ -69,10 +70,12 @@ pub(crate) fn check(layout: &Layout, prices: &Prices, found: &Budgeted, max_byte
     assert_eq!(found.bytes, taken.iter().map(|price| price.bytes).sum::<u64>());
     assert!(found.bytes <= max_bytes, "{} of {max_bytes} bytes", found.bytes);
     let error: f64 = taken.iter().map(|price| price.error.max(0.0)).sum();
-    // A unit for each node that is held; whole numbers are exact as long as the unit is below 1.
+    // Rounded up, by a unit for each node; whole numbers are exact as long as the unit is below 1.
     let all: f64 = prices.values().map(|price| price.error.max(0.0)).filter(|error| error.is_finite()).sum();
     let units = found.held.len() as f64 * all * 2f64.powi(-59);
-    let slack = 1e-14 * error + if units < 1.0 && error.fract() == 0.0 { 0.0 } else { units };
-    assert!(found.error == error || (found.error - error).abs() <= slack, "{} for {error}", found.error);
+    let is_exact = units < 1.0 && error.fract() == 0.0;
+    let most = if is_exact { error } else { error * (1.0 + 1e-14) + units };
+    let least = if is_exact { error } else { error * (1.0 - 1e-14) };
+    assert!((least..=most).contains(&found.error), "{}, expected {least} to {most}", found.error);
     assert!(found.lower_bound <= found.error);
 }
