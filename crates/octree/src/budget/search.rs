@@ -5,8 +5,11 @@ use volery_pyramid::Node;
 use super::hull::{Point, Step};
 use super::{Held, MAX_POINTS, Tradeoff};
 
+/// How many points of the root's first children together are kept.
+const MAX_JOINED: usize = 256;
+
 /// Pairs of cuts that are looked at in a search, or as many in nodes; then subtrees are no longer searched.
-const MAX_WORK: usize = 1 << 17;
+const MAX_WORK: usize = 1 << 18;
 
 /// What a visit of a node costs beside its pairs, in pairs.
 const VISIT_WORK: usize = 32;
@@ -119,7 +122,8 @@ impl Search<'_> {
         if self.work > MAX_WORK {
             self.is_whole = false;
             let best = (least.point, Pick::Vertex(node, least.vertex));
-            return self.keep(if least.point.bytes <= room.bytes { vec![best] } else { Vec::new() });
+            let cuts = if least.point.bytes <= room.bytes { vec![best] } else { Vec::new() };
+            return self.keep(cuts, MAX_POINTS);
         }
         let mut cuts = Vec::new();
         for choice in self.tradeoff.prices.of(&self.tradeoff.layout, node) {
@@ -129,12 +133,14 @@ impl Search<'_> {
             }
         }
         self.list_split(node, least.cost, room, &mut cuts);
-        self.keep(cuts)
+        let is_root = node == self.tradeoff.layout.root();
+        self.keep(cuts, if is_root { usize::MAX } else { MAX_POINTS })
     }
 
     /// The cuts of a subtree by its children, added to a list.
     fn list_split(&mut self, node: Node, least: u128, room: Room, cuts: &mut Vec<(Point, Pick)>) {
         let layout = &self.tradeoff.layout;
+        let root = layout.root();
         let children: Vec<Node> = layout.children(node).collect();
         let Some(leasts) = children.iter().map(|&child| self.least(child)).collect::<Option<Vec<_>>>() else {
             return;
@@ -165,13 +171,13 @@ impl Search<'_> {
             if place + 1 == children.len() {
                 cuts.append(&mut pairs);
             } else {
-                joined = self.keep(pairs);
+                joined = self.keep(pairs, if node == root { MAX_JOINED } else { MAX_POINTS });
             }
         }
     }
 
-    /// Those that no other beats, of these the [`MAX_POINTS`] of the least cost; bytes rising, errors falling.
-    fn keep(&mut self, mut cuts: Vec<(Point, Pick)>) -> Vec<Listed> {
+    /// Those that no other beats, of these [`thin`](Self::thin)ly at most so many; bytes rising, errors falling.
+    fn keep(&mut self, mut cuts: Vec<(Point, Pick)>, most: usize) -> Vec<Listed> {
         // Stable: of equal points the first stays.
         cuts.sort_by_key(|(point, _)| (point.bytes, point.error));
         let mut least = u64::MAX;
@@ -180,14 +186,30 @@ impl Search<'_> {
             least = least.min(point.error);
             is_better
         });
-        if cuts.len() > MAX_POINTS {
+        if cuts.len() > most {
             self.is_whole = false;
-            cuts.sort_by_key(|&(point, _)| (self.cost(point), point.bytes));
-            cuts.truncate(MAX_POINTS);
-            cuts.sort_by_key(|(point, _)| point.bytes);
+            self.thin(&mut cuts, most);
         }
         let first = self.picks.len();
         self.picks.extend(cuts.iter().map(|&(_, pick)| pick));
         (first..).zip(cuts).map(|(pick, (point, _))| Listed { point, pick }).collect()
+    }
+
+    /// Keeps of each of so many ranges of bytes the cut of the least cost.
+    fn thin(&self, cuts: &mut Vec<(Point, Pick)>, num_ranges: usize) {
+        let first = cuts[0].0.bytes;
+        let width = (cuts[cuts.len() - 1].0.bytes - first) / num_ranges as u64 + 1;
+        let mut kept: Vec<(Point, Pick)> = Vec::with_capacity(num_ranges);
+        for &cut in cuts.iter() {
+            match kept.last_mut() {
+                Some(last) if (last.0.bytes - first) / width == (cut.0.bytes - first) / width => {
+                    if self.cost(cut.0) < self.cost(last.0) {
+                        *last = cut;
+                    }
+                }
+                _ => kept.push(cut),
+            }
+        }
+        *cuts = kept;
     }
 }

@@ -13,7 +13,7 @@ use crate::world::Noise;
 const NEAR: f64 = 0.01;
 
 /// The same with fewer bytes, where a step of the root is a large part of all that there is.
-const NEAR_THE_ROOT: f64 = 0.15;
+const NEAR_THE_ROOT: f64 = 0.05;
 
 /// A volume with a surface: errors grow with the distance of samples and add up over the finest nodes inside a node, no
 /// two of which are equal.
