@@ -46,7 +46,7 @@ impl Gap {
             let found = (0..).zip(&gap.searched.listed).map(|(place, cut)| (cut.point, Way::Searched(place)));
             gap.listed.extend(found);
             // Stable: of equal cuts the first stays.
-            gap.listed.sort_by_key(|(point, _)| (point.bytes, point.error));
+            gap.listed.sort_by_key(|&(point, _)| point);
             let mut least = u64::MAX;
             gap.listed.retain(|(point, _)| {
                 let is_better = point.error < least;

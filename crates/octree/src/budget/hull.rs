@@ -7,8 +7,8 @@ use volery_pyramid::{Layout, Node};
 use super::fixed::{SUM_BITS, Scale};
 use super::{Held, Price};
 
-/// What a cut of a subtree takes and loses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a cut of a subtree takes and loses; ordered by bytes, then errors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Point {
     pub(super) bytes: u64,
     /// In units of [`Scale`].
@@ -108,7 +108,7 @@ fn choices(layout: &Layout, level: u32, asked: &Lists<(u32, Price)>, scale: &Sca
         };
         sorted.clear();
         sorted.extend(asked.get(index).iter().rev().map(choice));
-        sorted.sort_by_key(|choice| (choice.point.bytes, choice.point.error));
+        sorted.sort_by_key(|choice| choice.point);
         let mut least = u64::MAX;
         for &choice in &sorted {
             if choice.point.error < least {
@@ -386,7 +386,7 @@ impl Hulls {
         self.splits(layout, node, |point, count| points.push((point, Origin::Split(count))));
         points.retain(|(point, _)| (from.bytes..to.bytes).contains(&point.bytes));
         // Stable: of equal points the first stays.
-        points.sort_by_key(|(point, _)| (point.bytes, point.error));
+        points.sort_by_key(|&(point, _)| point);
         let mut least = from.error;
         points.retain(|(point, _)| {
             let is_better = point.error < least;

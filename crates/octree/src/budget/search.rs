@@ -28,7 +28,7 @@ pub(super) struct Cuts {
 #[derive(Clone, Copy)]
 pub(super) struct Listed {
     pub(super) point: Point,
-    pick: usize,
+    pick: u32,
 }
 
 /// What a cut is made of: places in a list of these.
@@ -38,9 +38,19 @@ enum Pick {
     Held(Held),
     /// A vertex of a subtree's hull.
     Vertex(Node, usize),
-    /// The first comes first in canonical order.
-    Both(usize, usize),
+    /// Places before this one; the first comes first in canonical order.
+    Both([u32; 2]),
 }
+
+/// A cut of a subtree before it is known to be kept: two picks together.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate {
+    point: Point,
+    parts: [u32; 2],
+}
+
+/// The place of [`Pick::Nothing`].
+const NOTHING: u32 = 0;
 
 /// What a part of a cut may take without making the whole useless.
 #[derive(Clone, Copy)]
@@ -78,12 +88,12 @@ impl Cuts {
         self.unfold(tradeoff, self.listed[place].pick, held);
     }
 
-    fn unfold(&self, tradeoff: &Tradeoff, pick: usize, held: &mut Vec<Held>) {
-        match self.picks[pick] {
+    fn unfold(&self, tradeoff: &Tradeoff, pick: u32, held: &mut Vec<Held>) {
+        match self.picks[pick as usize] {
             Pick::Nothing => {}
             Pick::Held(one) => held.push(one),
             Pick::Vertex(node, vertex) => tradeoff.hulls.take(&tradeoff.layout, node, vertex, None, held),
-            Pick::Both(first, second) => {
+            Pick::Both([first, second]) => {
                 self.unfold(tradeoff, first, held);
                 self.unfold(tradeoff, second, held);
             }
@@ -121,15 +131,15 @@ impl Search<'_> {
         self.work += VISIT_WORK;
         if self.work > MAX_WORK {
             self.is_whole = false;
-            let best = (least.point, Pick::Vertex(node, least.vertex));
-            let cuts = if least.point.bytes <= room.bytes { vec![best] } else { Vec::new() };
-            return self.keep(cuts, MAX_POINTS);
+            let fits = least.point.bytes <= room.bytes;
+            let best = fits.then(|| self.candidate(least.point, Pick::Vertex(node, least.vertex)));
+            return self.keep(best.into_iter().collect(), MAX_POINTS);
         }
         let mut cuts = Vec::new();
         for choice in self.tradeoff.prices.of(&self.tradeoff.layout, node) {
             if choice.point.bytes <= room.bytes && self.cost(choice.point) - least.cost < room.excess {
                 let held = Held { node, resolution: choice.resolution };
-                cuts.push((choice.point, Pick::Held(held)));
+                cuts.push(self.candidate(choice.point, Pick::Held(held)));
             }
         }
         self.list_split(node, least.cost, room, &mut cuts);
@@ -137,8 +147,13 @@ impl Search<'_> {
         self.keep(cuts, if is_root { usize::MAX } else { MAX_POINTS })
     }
 
+    fn candidate(&mut self, point: Point, pick: Pick) -> Candidate {
+        self.picks.push(pick);
+        Candidate { point, parts: [self.picks.len() as u32 - 1, NOTHING] }
+    }
+
     /// The cuts of a subtree by its children, added to a list.
-    fn list_split(&mut self, node: Node, least: u128, room: Room, cuts: &mut Vec<(Point, Pick)>) {
+    fn list_split(&mut self, node: Node, least: u128, room: Room, cuts: &mut Vec<Candidate>) {
         let layout = &self.tradeoff.layout;
         let root = layout.root();
         let children: Vec<Node> = layout.children(node).collect();
@@ -152,7 +167,7 @@ impl Search<'_> {
         }
         let excess = room.excess - (least_split - least);
         let spare = room.bytes - fewest_bytes;
-        let mut joined = vec![Listed { point: Point { bytes: 0, error: 0 }, pick: 0 }];
+        let mut joined = vec![Listed { point: Point { bytes: 0, error: 0 }, pick: NOTHING }];
         let (mut joined_least, mut joined_bytes) = (0, 0);
         for (place, (&child, least)) in children.iter().zip(leasts).enumerate() {
             let listed = self.list(child, Room { bytes: least.fewest_bytes + spare, excess });
@@ -164,7 +179,7 @@ impl Search<'_> {
                 for b in &listed {
                     let point = a.point.plus(b.point);
                     if point.bytes <= joined_bytes + spare && self.cost(point) - joined_least < excess {
-                        pairs.push((point, Pick::Both(a.pick, b.pick)));
+                        pairs.push(Candidate { point, parts: [a.pick, b.pick] });
                     }
                 }
             }
@@ -177,33 +192,34 @@ impl Search<'_> {
     }
 
     /// Those that no other beats, of these [`thin`](Self::thin)ly at most so many; bytes rising, errors falling.
-    fn keep(&mut self, mut cuts: Vec<(Point, Pick)>, most: usize) -> Vec<Listed> {
-        // Stable: of equal points the first stays.
-        cuts.sort_by_key(|(point, _)| (point.bytes, point.error));
+    fn keep(&mut self, mut cuts: Vec<Candidate>, most: usize) -> Vec<Listed> {
+        // By bytes, then errors; of equal points by which was found first.
+        cuts.sort_unstable();
         let mut least = u64::MAX;
-        cuts.retain(|(point, _)| {
-            let is_better = point.error < least;
-            least = least.min(point.error);
+        cuts.retain(|cut| {
+            let is_better = cut.point.error < least;
+            least = least.min(cut.point.error);
             is_better
         });
         if cuts.len() > most {
             self.is_whole = false;
             self.thin(&mut cuts, most);
         }
-        let first = self.picks.len();
-        self.picks.extend(cuts.iter().map(|&(_, pick)| pick));
-        (first..).zip(cuts).map(|(pick, (point, _))| Listed { point, pick }).collect()
+        let first = self.picks.len() as u32;
+        self.picks.extend(cuts.iter().map(|cut| Pick::Both(cut.parts)));
+        (first..).zip(cuts).map(|(pick, cut)| Listed { point: cut.point, pick }).collect()
     }
 
     /// Keeps of each of so many ranges of bytes the cut of the least cost.
-    fn thin(&self, cuts: &mut Vec<(Point, Pick)>, num_ranges: usize) {
-        let first = cuts[0].0.bytes;
-        let width = (cuts[cuts.len() - 1].0.bytes - first) / num_ranges as u64 + 1;
-        let mut kept: Vec<(Point, Pick)> = Vec::with_capacity(num_ranges);
+    fn thin(&self, cuts: &mut Vec<Candidate>, num_ranges: usize) {
+        let first = cuts[0].point.bytes;
+        let width = (cuts[cuts.len() - 1].point.bytes - first) / num_ranges as u64 + 1;
+        let range_of = |cut: &Candidate| (cut.point.bytes - first) / width;
+        let mut kept: Vec<Candidate> = Vec::with_capacity(num_ranges);
         for &cut in cuts.iter() {
             match kept.last_mut() {
-                Some(last) if (last.0.bytes - first) / width == (cut.0.bytes - first) / width => {
-                    if self.cost(cut.0) < self.cost(last.0) {
+                Some(last) if range_of(last) == range_of(&cut) => {
+                    if self.cost(cut.point) < self.cost(last.point) {
                         *last = cut;
                     }
                 }

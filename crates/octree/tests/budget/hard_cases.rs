@@ -178,7 +178,6 @@ fn errors_at_the_ends_of_numbers_neither_overflow_nor_vanish() {
     for (at, price) in prices.values_mut().enumerate() {
         price.error = [f64::MAX, f64::MIN_POSITIVE, 5e-324, 1.0][at % 4];
     }
-    // A HashMap's order is its own; what is checked here holds in any.
     let tradeoff = tradeoff(&layout, &prices);
     let mut last = f64::INFINITY;
     for max_bytes in (tradeoff.min_bytes()..=tradeoff.max_bytes()).step_by(13) {

@@ -1,6 +1,6 @@
 //! Trees of the size in use: how near the optimum is known to be, and that bytes are used.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use volery_octree::{Price, Tradeoff};
@@ -19,7 +19,7 @@ const NEAR_THE_ROOT: f64 = 0.05;
 /// two of which are equal.
 fn shell(layout: &Layout) -> crate::Prices {
     let mut noise = Noise(3);
-    let mut weights: HashMap<Node, f64> = HashMap::new();
+    let mut weights: BTreeMap<Node, f64> = BTreeMap::new();
     for node in layout.level_nodes(0) {
         let [low, high] = layout.bounds(node);
         let distance = (((low + high) / 2.0 - DVec3::splat(255.5)).length() - 180.0).abs();

@@ -9,7 +9,7 @@ mod oracle;
 #[allow(dead_code, reason = "of what tests share these use a part")]
 mod world;
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use volery_octree::validate::defects;
@@ -18,7 +18,7 @@ use volery_pyramid::{Kind, Layout, Node};
 use world::Noise;
 
 /// The price of everything that a tree can hold.
-pub(crate) type Prices = HashMap<(Node, u32), Price>;
+pub(crate) type Prices = BTreeMap<(Node, u32), Price>;
 
 /// A tree of `2^depth` finest nodes along its longest axis.
 pub(crate) fn tree(dims: [usize; 3]) -> Layout {

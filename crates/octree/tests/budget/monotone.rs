@@ -8,7 +8,7 @@ use crate::{Prices, arbitrary, check, like_a_volume, tradeoff, tree};
 
 fn prices(layout: &volery_pyramid::Layout, seed: u64) -> Prices {
     let mut noise = Noise(seed);
-    if seed % 2 == 0 { arbitrary(layout, &mut noise) } else { like_a_volume(layout, &mut noise) }
+    if seed.is_multiple_of(2) { arbitrary(layout, &mut noise) } else { like_a_volume(layout, &mut noise) }
 }
 
 proptest! {
