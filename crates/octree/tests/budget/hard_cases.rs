@@ -139,6 +139,27 @@ fn of_unknown_errors_the_least_part_of_the_domain_is_taken() {
     }
 }
 
+/// Two nodes that no resolution makes known, in opposite corners: all else is known all the same, though one node that
+/// is unknown as a whole would be fewer of them.
+#[test]
+fn what_stays_unknown_does_not_keep_the_rest_coarse() {
+    let layout = tree([9; 3]);
+    let blanks = [Node::new(0, [0; 3]), Node::new(0, [3; 3])];
+    let mut prices = strict(&layout);
+    for (&(node, _), price) in &mut prices {
+        if blanks.iter().any(|blank| blank.ancestor(node.level) == node) {
+            price.error = f64::INFINITY;
+        }
+    }
+    let found = tradeoff(&layout, &prices).cut(u64::MAX).expect("enough");
+    let unknown =
+        found.held.iter().filter(|held| prices[&(held.node, held.resolution)].error == f64::INFINITY);
+    let unknown: Vec<Node> = unknown.map(|held| held.node).collect();
+    assert_eq!(unknown, blanks);
+    assert!(found.held.iter().all(|held| held.resolution == 0 || blanks.contains(&held.node)));
+    assert_eq!(found.error, f64::INFINITY);
+}
+
 #[test]
 fn where_all_is_unknown_the_smallest_cut_is_as_good_as_any() {
     let layout = tree([9; 3]);
@@ -191,6 +212,20 @@ fn errors_at_the_ends_of_numbers_neither_overflow_nor_vanish() {
     let tiny = tiny.expect("all is covered");
     let finest = tiny.cut(u64::MAX).expect("enough");
     assert!(finest.held.iter().all(|held| held.resolution == 0) && finest.error > 0.0);
+}
+
+/// Beside the largest of errors the smallest is not none.
+#[test]
+fn a_vanishing_error_is_an_error() {
+    let layout = tree([5, 3, 3]);
+    let price = |node: Node, resolution: u32| {
+        let error = if node == Node::new(0, [0; 3]) { 5e-324 } else { 1e308 };
+        let is_leaf = node.level == 0;
+        is_leaf.then(|| Price { bytes: 2 - u64::from(resolution), error: error * f64::from(resolution) })
+    };
+    let found = Tradeoff::new(&layout, price).expect("all is covered").cut(u64::MAX).expect("enough");
+    assert!(found.held.iter().all(|held| held.resolution == 0), "{found:?}");
+    assert_eq!(found.error, 0.0);
 }
 
 #[test]
