@@ -77,7 +77,7 @@ pub(super) fn cuts(tradeoff: &Tradeoff, from: Point, step: Step) -> Cuts {
     let mut search = Search { tradeoff, step, picks: vec![Pick::Nothing], work: 0, is_whole: true };
     // At the corner, that is at the bytes of the next vertex and the error of this one, a point costs this much more.
     let excess = u128::from(step.bytes) * u128::from(step.error);
-    let mut listed = search.list(tradeoff.layout.root(), Room { bytes: from.bytes + step.bytes / 2, excess });
+    let mut listed = search.list(tradeoff.layout.root(), Room { bytes: from.bytes + step.bytes - 1, excess });
     listed.retain(|cut| cut.point.error < from.error);
     Cuts { listed, picks: search.picks, is_whole: search.is_whole }
 }
