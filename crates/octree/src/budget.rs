@@ -30,8 +30,9 @@
 //! 4. *Search.* With the line's slope as price of a byte, a choice costs its error and its bytes; what it costs more
 //!    than the best of its subtree adds up over the tree, and what exceeds the height of the corner cannot be part of a
 //!    better cut. Nor can what leaves too few bytes for the rest. Few choices remain; their points are listed from the
-//!    leaves up, without those that others beat in both. At most [`MAX_POINTS`] are kept of a subtree, those nearest to
-//!    the line; and after a fixed number of steps the rest of the tree stays as the price of a byte has it.
+//!    leaves up, without those that others beat in both. Of a subtree at most [`MAX_POINTS`] are kept, of each of so many
+//!    ranges of bytes the nearest to the line; and after a fixed number of steps the rest of the tree stays as the price
+//!    of a byte has it.
 //!
 //! # Guarantees
 //! - Never above the budget. [`Budgeted::lower_bound`] says how near the optimum an answer is. It is the optimum where
@@ -71,7 +72,7 @@ use fixed::Scale;
 use gap::Gap;
 use hull::{Hulls, Prices};
 
-/// A gain below this part of the error is not searched for.
+/// Gains below this part of the error are not searched for.
 pub const GAP: f64 = 1.0 / 1024.0;
 
 /// How many points of a subtree are kept in a search.
