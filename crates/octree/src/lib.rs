@@ -6,7 +6,8 @@
 //! tolerance, view frustum and transparency are filters ([`filters`]), a tuple of filters is a filter, and
 //! so is a closure. The result, a [`Cut`], is plain data; [`validate`](validate::defects) lists what is
 //! wrong with one that came from elsewhere. [`balance()`] refines a cut until nodes that touch differ by one
-//! level at most. [`front_to_back`] sorts a cut for the eye.
+//! level at most. [`front_to_back`] sorts a cut for the eye. Where bytes are limited, a [`Tradeoff`] says what they buy
+//! at best.
 //!
 //! # Guarantees
 //! - Drawn and skipped nodes of a selected cut cover the domain exactly once, each sample belonging to one.
@@ -22,6 +23,7 @@
 
 pub mod balance;
 pub mod blend;
+pub mod budget;
 pub mod certify;
 pub mod cut;
 pub mod filters;
@@ -33,6 +35,7 @@ pub mod validate;
 
 pub use balance::balance;
 pub use blend::low_corners;
+pub use budget::{BudgetTooSmall, Budgeted, Held, Price, Tradeoff, Uncovered};
 pub use certify::{Certified, certified, without_unseen};
 pub use cut::Cut;
 pub use filters::{CuttingPlanes, DataTolerance, Focus, Frustum, Transparency};

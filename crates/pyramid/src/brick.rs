@@ -10,7 +10,8 @@ use volery_scene::{Sample, SampleType};
 pub struct BrickShape {
     /// The level's sample that comes first; -1 where the averaged kind begins at the domain's end.
     pub first: [i64; 3],
-    /// Samples along x, y, z; at most `brick_cells + 1` (decimated) or `brick_cells + 2` (averaged).
+    /// Samples along x, y, z; of a node at its own level at most `brick_cells + 1` (decimated) or `brick_cells + 2`
+    /// (averaged).
     pub count: [usize; 3],
 }
 

@@ -235,17 +235,6 @@ impl Layout {
 
     /// Which samples of its level a node's brick holds.
     pub fn brick_shape(&self, node: Node) -> BrickShape {
-        let dims = self.level_dims(node.level);
-        let first_own = node.index.map(|i| i as usize * self.brick_cells);
-        match self.kind {
-            Kind::Decimated => BrickShape {
-                first: first_own.map(|first| first as i64),
-                count: std::array::from_fn(|a| (dims[a] - first_own[a]).min(self.brick_cells + 1)),
-            },
-            Kind::Averaged => BrickShape {
-                first: first_own.map(|first| first as i64 - 1),
-                count: std::array::from_fn(|a| (dims[a] - first_own[a]).min(self.brick_cells) + 2),
-            },
-        }
+        self.block_shape(node, node.level)
     }
 }

@@ -44,6 +44,7 @@
 mod analysis;
 pub mod brick;
 pub mod cubes;
+pub mod held;
 pub mod layout;
 mod levels;
 pub mod node;
@@ -53,6 +54,7 @@ pub mod stats;
 
 pub use brick::{Brick, BrickSamples, BrickShape};
 pub use cubes::{Cube, CubeTree};
+pub use held::held_error;
 pub use layout::{Kind, Layout};
 pub use node::Node;
 pub use pyramid::Pyramid;

@@ -51,6 +51,7 @@ mod grid;
 mod image;
 mod integral;
 pub mod metrics;
+pub mod opacity;
 mod planes;
 mod render;
 mod surfaces;

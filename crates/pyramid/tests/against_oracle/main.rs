@@ -1,5 +1,6 @@
 //! The pyramid against slow oracles.
 
 mod bricks;
+mod held;
 mod oracle;
 mod statistics;

@@ -195,7 +195,7 @@ pub(crate) fn stats(levels: &Levels, layout: &Layout, node: Node) -> NodeStats {
     } else if any_blank {
         f64::INFINITY
     } else {
-        node_error(levels, span, node)
+        error_at(levels, layout, node, node.level)
     };
     NodeStats {
         min: support.iter().copied().fold(f64::INFINITY, f64::min),
@@ -208,7 +208,9 @@ pub(crate) fn stats(levels: &Levels, layout: &Layout, node: Node) -> NodeStats {
     }
 }
 
-fn node_error(levels: &Levels, span: usize, node: Node) -> f64 {
+/// The largest difference of the fields of the level `resolution` and the finest in a closed node.
+pub(crate) fn error_at(levels: &Levels, layout: &Layout, node: Node, resolution: u32) -> f64 {
+    let span = layout.brick_cells() << node.level;
     // Bounds in half samples.
     let bounds: [[usize; 2]; 3] = std::array::from_fn(|a| {
         let offset = usize::from(levels.kind == Kind::Averaged);
@@ -220,7 +222,7 @@ fn node_error(levels: &Levels, span: usize, node: Node) -> f64 {
     for z in bounds[2][0]..=bounds[2][1] {
         for y in bounds[1][0]..=bounds[1][1] {
             for x in bounds[0][0]..=bounds[0][1] {
-                error = error.max(levels.difference(node.level, [x, y, z]));
+                error = error.max(levels.difference(resolution, [x, y, z]));
             }
         }
     }

@@ -8,6 +8,7 @@ mod closed_forms;
 mod collapsed;
 mod extremes;
 mod grids;
+mod opacity;
 mod planes;
 mod requests;
 mod slow;
