@@ -173,7 +173,7 @@ pub struct Unblended<B>(pub B);
 
 impl<B: Backend> Backend for Unblended<B> {
     volery_conformance::hand_on!(self, self.0 => device set_volume volume is_resident upload evict resident_bytes
-        uploaded_bytes begin begin_windows draw_windows finished finish);
+        uploaded_bytes begin begin_windows draw_windows wait finished finish);
 
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {
         let Content::Planes(planes) = *content else { return self.0.draw_part(content) };

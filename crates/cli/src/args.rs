@@ -9,7 +9,7 @@ use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::io::one_of;
 use volery::io::scene_file::{SceneInput, SceneThickness};
-use volery::{BackendChoice, Plane, Preset};
+use volery::{BackendChoice, Plane, Preset, View};
 
 use crate::wanted;
 
@@ -102,6 +102,12 @@ pub(crate) struct RenderArgs {
     /// Largest difference of a value from the full resolution, as a fraction of the file's value range
     #[arg(long, value_name = "T", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
+    /// Draw the best picture that so many milliseconds allow (techniques raycast, plane, stack)
+    #[arg(long, value_name = "B", value_parser = parse_budget, allow_negative_numbers = true)]
+    pub(crate) budget_ms: Option<f64>,
+    /// Where somebody looks, as shares of the picture's width and height: with --budget-ms, what is near is drawn better
+    #[arg(long, value_name = "X,Y", value_parser = parse_gaze, allow_hyphen_values = true, requires = "budget_ms")]
+    pub(crate) gaze: Option<[f64; 2]>,
     /// Write pictures on the way to the last one into this folder, each with its report: of planes each time that
     /// more of the data has arrived, else coarse ones first
     #[arg(long, value_name = "DIR")]
@@ -137,6 +143,10 @@ pub(crate) struct RenderArgs {
     /// as OUT-%03d.png, each is a file of its own
     #[arg(long, help_heading = "Output", value_name = "N", default_value_t = 1, value_parser = whole(1_000_000))]
     pub(crate) frames: u32,
+    /// Move the camera from one of the --frames to the next: once around, to half the distance, or both as in Li and Shen
+    /// 2001 (a quarter nearer, half around, a quarter back)
+    #[arg(long, help_heading = "Output", value_enum, value_name = "PATH")]
+    pub(crate) path: Option<PathName>,
 }
 
 /// What the technique plane alone reads.
@@ -217,6 +227,13 @@ impl RenderArgs {
         let conflict = wanted::conflict(&wanted, false).or_else(unread).or_else(steps).or_else(map);
         let data = || data_without_scene(self.data.as_ref(), &self.input);
         conflict.or_else(data).or_else(|| series::conflict(self))
+    }
+
+    /// The view of a frame, of which the first is the view itself.
+    pub(crate) fn view_at(&self, view: &View, frame: usize) -> View {
+        let num = self.frames as usize;
+        let way = |path| volery::Path::from(path).camera(&view.camera, frame, num);
+        View { camera: self.path.map_or(view.camera, way), ..view.clone() }
     }
 
     /// Whether the exact picture is wanted.
@@ -304,6 +321,27 @@ impl From<ThicknessName> for SceneThickness {
     }
 }
 
+/// The way of a camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PathName {
+    /// Once around what it looks at
+    Orbit,
+    /// To half the distance
+    Zoom,
+    /// A quarter of the frames nearer, half around, a quarter back
+    Paper,
+}
+
+impl From<PathName> for volery::Path {
+    fn from(name: PathName) -> Self {
+        match name {
+            PathName::Orbit => Self::Orbit,
+            PathName::Zoom => Self::Zoom,
+            PathName::Paper => Self::Paper,
+        }
+    }
+}
+
 /// Who draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum BackendName {
@@ -368,6 +406,19 @@ fn parse_view(text: &str) -> Result<Direction, String> {
     let good = azimuth_deg.is_finite() && elevation_deg.is_finite() && (1e-3..=1e3).contains(&zoom);
     let wrong = || "expected finite degrees, and a zoom from 0.001 to 1000".to_owned();
     good.then_some(Direction { azimuth_deg, elevation_deg, zoom }).ok_or_else(wrong)
+}
+
+fn parse_budget(text: &str) -> Result<f64, String> {
+    let found = text.parse().ok();
+    let good = found.filter(|budget: &f64| *budget >= 0.0 && budget.is_finite());
+    good.ok_or_else(|| "expected a number of milliseconds of at least 0".to_owned())
+}
+
+fn parse_gaze(text: &str) -> Result<[f64; 2], String> {
+    let shares: Option<Vec<f64>> = text.split(',').map(|share| share.trim().parse().ok()).collect();
+    let good = shares.filter(|shares| shares.iter().all(|share| (0.0..=1.0).contains(share)));
+    let good = good.and_then(|shares| <[f64; 2]>::try_from(shares).ok());
+    good.ok_or_else(|| "expected two numbers from 0 to 1, such as 0.5,0.5".to_owned())
 }
 
 fn parse_tolerance(text: &str) -> Result<f64, String> {

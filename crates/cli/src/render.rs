@@ -6,6 +6,7 @@ use std::path::Path;
 use volery::io::is_grid;
 use volery::io::scene_file::{SceneBackend, SceneFile, SceneTechnique};
 use volery::output::write_image;
+use volery::report;
 use volery::{
     Backend, BackendChoice, Data, How, Input, InputData, InputOptions, Picture, RenderError, Session, Step,
     View, VolumeData, VoxelGrid,
@@ -30,6 +31,13 @@ struct Run<'a> {
     wanted: SceneFile,
     input: Input,
     outputs: Outputs,
+}
+
+impl Run<'_> {
+    /// Whether each of the frames is another picture.
+    fn is_sequence(&self) -> bool {
+        self.args.path.is_some() || self.wanted.budget_ms.is_some()
+    }
 }
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
@@ -147,14 +155,44 @@ fn run_volume(run: &Run, grid: &VoxelGrid, backend: &mut dyn Backend) -> Result<
     }
     let picture = {
         let _busy = Progress::spinner("drawing");
-        let drawn = session.render_frames(&view, args.frames as usize, backend);
-        drawn.map_err(|error| Failure::of_file(&input.path, error))?
+        frames(run, &mut session, &view, backend)?
     };
     files::finish(run, &view, picture, &session)?;
     if let Some(option) = because {
         say(format_args!("note: drawn by --technique plane, which alone reads {option}"))?;
     }
     Ok(())
+}
+
+/// Draws all frames of a view, or of a camera's way from it. Where each is another picture, each is written as soon as it
+/// is there, if it has a name of its own; returned is the last one, with the times of all.
+fn frames<D: Data>(
+    run: &Run,
+    session: &mut Session<D>,
+    view: &View,
+    backend: &mut dyn Backend,
+) -> Result<Picture, Failure> {
+    let Run { args, input, .. } = run;
+    let of_file = |error: RenderError| Failure::of_file(&input.path, error);
+    let num = args.frames as usize;
+    if !run.is_sequence() {
+        return session.render_frames(view, num, backend).map_err(of_file);
+    }
+    let mut pictures: Vec<(report::Seconds, report::Frame)> = Vec::with_capacity(num);
+    let mut last = None;
+    for frame in 0..num {
+        let picture = session.render(&args.view_at(view, frame), backend).map_err(of_file)?;
+        if let Some(name) = numbered(&args.output, frame).filter(|_| frame + 1 < num) {
+            write_image(&name, &picture.image)?;
+        }
+        pictures.extend(picture.report.frames.first().map(|&times| (picture.report.seconds, times)));
+        last = Some(picture);
+    }
+    let mut last = last.ok_or_else(|| of_file(RenderError::NoFrame))?;
+    last.report.frames = pictures.iter().map(|(_, frame)| *frame).collect();
+    pictures.sort_by(|(a, _), (b, _)| a.frame.total_cmp(&b.frame));
+    last.report.seconds = pictures[(pictures.len() - 1) / 2].0;
+    Ok(last)
 }
 
 fn needs_grid(input: &Input, option: &str) -> Failure {

@@ -11,7 +11,7 @@ use volery::io::scene_file::{
 use volery::io::transfer::{TransferError, TransferOptions, TransferProblem};
 use volery::io::{one_of, read_transfer, read_transfer_2d};
 use volery::{
-    Data, Dial, Focus, How, Input, InputData, Plane, PlaneView, Preset, Sampling, Session, Slicing,
+    Data, Deadline, Dial, Focus, How, Input, InputData, Plane, PlaneView, Preset, Sampling, Session, Slicing,
     StackView, Thickness, View, ViewOptions,
 };
 
@@ -92,9 +92,18 @@ pub(crate) fn given(wanted: &SceneFile, is_of_scene: bool) -> Vec<Given> {
 
 /// Why options that one technique alone reads cannot stand together, or beside the technique asked for.
 pub(crate) fn conflict(wanted: &SceneFile, is_of_scene: bool) -> Option<String> {
-    if wanted.tolerance.is_some() && wanted.error.is_some() {
+    let dials = [
+        ("tolerance", wanted.tolerance.is_some()),
+        ("error", wanted.error.is_some()),
+        (if is_of_scene { "budget_ms" } else { "budget-ms" }, wanted.budget_ms.is_some()),
+    ];
+    let mut turned = dials.iter().filter(|(_, is_turned)| *is_turned).map(|(name, _)| name);
+    if let (Some(first), Some(second)) = (turned.next(), turned.next()) {
         let prefix = if is_of_scene { "" } else { "--" };
-        return Some(format!("{prefix}tolerance and {prefix}error exclude each other, expected one dial"));
+        return Some(format!("{prefix}{first} and {prefix}{second} exclude each other, expected one dial"));
+    }
+    if is_of_scene && wanted.gaze.is_some() && wanted.budget_ms.is_none() {
+        return Some("gaze is read with budget_ms alone".to_owned());
     }
     let given = given(wanted, is_of_scene);
     let alone =
@@ -135,6 +144,8 @@ pub(crate) fn over(args: &RenderArgs, scene: Option<&SceneFile>, input: SceneInp
         range: args.range.or(scene.range),
         technique: scene_technique(args.technique).or(scene.technique),
         tolerance: args.tolerance.or(scene.tolerance),
+        budget_ms: args.budget_ms.or(scene.budget_ms),
+        gaze: args.gaze.or(scene.gaze),
         planes: if own_planes.is_empty() { scene.planes } else { own_planes },
         focus: focus.or(scene.focus),
         error: planes.error.or(scene.error),
@@ -210,10 +221,13 @@ pub(crate) fn view<D: Data>(
         view.camera = if args.orthographic { fit::orthographic(&camera) } else { camera };
     }
     view.background = wanted.background.unwrap_or(view.background);
-    view.dial = match (wanted.tolerance, wanted.error) {
-        (Some(tolerance), _) => Dial::Tolerance(tolerance),
-        (None, Some(error)) => Dial::Error(error),
-        (None, None) => Dial::Full,
+    view.dial = match (wanted.tolerance, wanted.error, wanted.budget_ms) {
+        (Some(tolerance), ..) => Dial::Tolerance(tolerance),
+        (None, Some(error), _) => Dial::Error(error),
+        (None, None, Some(budget)) => {
+            Dial::Deadline(Deadline { budget_secs: 1e-3 * budget, gaze: wanted.gaze })
+        }
+        (None, None, None) => Dial::Full,
     };
     view.meshes = input.meshes.clone();
     Ok(view)

@@ -92,6 +92,11 @@ macro_rules! hand_on {
             $to.finished()
         }
     };
+    (@wait $this:ident, $to:expr) => {
+        fn wait(&mut $this) -> Result<(), ::volery_frame::DrawError> {
+            $to.wait()
+        }
+    };
     (@finish $this:ident, $to:expr) => {
         fn finish(&mut $this) -> Result<::volery_frame::Drawn, ::volery_frame::DrawError> {
             $to.finish()

@@ -218,6 +218,7 @@ properties! { $
         nothing_that_was_kept_is_stale
         cameras_that_move_upload_nothing
         finished_parts_are_told_once
+        parts_can_be_waited_for
         times_of_parts_add_up
         pictures_are_begun_and_ended;
     windows:

@@ -433,6 +433,28 @@ pub fn finished_parts_are_told_once(backend: &mut dyn Backend) {
     }
 }
 
+/// Whoever waits hears of all parts before the end, and does not wait where there is nothing to wait for.
+pub fn parts_can_be_waited_for(backend: &mut dyn Backend) {
+    let world = World::new(backend, false);
+    assert_eq!(backend.wait(), Ok(()), "a wait without a picture");
+    backend.begin(&world.view(&[])).expect("the suite's pictures are small");
+    for part in &world.cut(Kind::Rays, 7) {
+        backend.draw_part(part).expect("the suite's parts are right");
+    }
+    let mut told = Vec::new();
+    // Each wait is for one at least; a device may be done with one a moment before it tells.
+    for _ in 0..1000 {
+        assert_eq!(backend.wait(), Ok(()));
+        told.extend(backend.finished());
+        if told.len() == 7 {
+            break;
+        }
+    }
+    assert_eq!(told.len(), 7, "parts told after waiting");
+    backend.finish().expect("a picture was begun");
+    assert_eq!(backend.finished(), [], "parts told twice");
+}
+
 /// In 1, 7 and 50 parts: the device's seconds of parts are those of the picture, but for what comes before the first part
 /// and after the last. A backend without a clock has none to compare.
 pub fn times_of_parts_add_up(backend: &mut dyn Backend) {

@@ -85,7 +85,7 @@ pub fn strides_show_some_rays_of_the_picture(backend: &mut dyn Backend) {
         // What was drawn before with another stride is gone.
         for stride in [MAX_STRIDE / stride_of(window), stride_of(window)] {
             backend
-                .draw_windows(&content, &[Window { number: window, stride: stride }])
+                .draw_windows(&content, &[Window { number: window, stride }])
                 .expect("the suite's windows are right");
         }
     }
@@ -110,7 +110,7 @@ pub fn strides_show_some_rays_of_the_picture(backend: &mut dyn Backend) {
     for (content, stride) in
         [(content, 0), (content, 3), (content, 2 * MAX_STRIDE), (world.whole(Kind::Planes), 2)]
     {
-        let found = backend.draw_windows(&content, &[Window { number: 0, stride: stride }]);
+        let found = backend.draw_windows(&content, &[Window { number: 0, stride }]);
         assert!(
             matches!(found, Err(DrawError::Window { found, .. }) if found == stride),
             "{stride}: {found:?}"

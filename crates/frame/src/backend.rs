@@ -332,6 +332,13 @@ pub trait Backend: Send {
     /// told once, in any order; after [`Backend::finish`] all are.
     fn finished(&mut self) -> Vec<FinishedPart>;
 
+    /// Waits until one of the parts that were not told is drawn, if there are any. That it is drawn at once is enough for a
+    /// backend that hands nothing out.
+    ///
+    /// # Errors
+    /// When the device fails.
+    fn wait(&mut self) -> Result<(), DrawError>;
+
     /// Ends the picture: puts surfaces and background behind it and reads it back.
     ///
     /// # Errors

@@ -71,6 +71,12 @@ pub struct SceneFile {
     /// Largest difference of a value from the full resolution, as a fraction of the value range.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::tolerance")]
     pub tolerance: Option<f64>,
+    /// Milliseconds until the picture shall be there.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::budget")]
+    pub budget_ms: Option<f64>,
+    /// Where somebody looks, as shares of the picture from its upper left corner.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::gaze")]
+    pub gaze: Option<[f64; 2]>,
     /// Cutting planes.
     #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "check::planes")]
     pub planes: Vec<ScenePlane>,

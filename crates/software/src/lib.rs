@@ -272,6 +272,11 @@ impl Backend for SoftwareBackend {
         std::mem::take(&mut self.finished)
     }
 
+    /// Parts are drawn when their call returns.
+    fn wait(&mut self) -> Result<(), DrawError> {
+        Ok(())
+    }
+
     fn finish(&mut self) -> Result<Drawn, DrawError> {
         let start = Instant::now();
         let target = self.picture.take().ok_or(DrawError::NoPicture)?;

@@ -12,7 +12,7 @@ struct Keeping {
 
 impl Backend for Keeping {
     volery_conformance::hand_on!(self, self.backend => device set_volume volume is_resident upload evict resident_bytes
-        uploaded_bytes begin begin_windows draw_windows draw_part finished);
+        uploaded_bytes begin begin_windows draw_windows wait draw_part finished);
 
     fn finish(&mut self) -> Result<Drawn, DrawError> {
         let drawn = self.backend.finish()?;

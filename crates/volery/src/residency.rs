@@ -80,8 +80,8 @@ pub(crate) fn missing_bytes(
     missing as u64 * brick_bytes(source, store)
 }
 
-/// Makes the first of these bricks resident that are not, of so many bytes together. A backend that has no room for them
-/// goes without.
+/// Makes the first of these bricks resident that are not, of so many bytes together, one at least: then all are, some time.
+/// A backend that has no room for them goes without.
 pub(crate) fn prefetch(
     source: &dyn NodeSource,
     store: &Store,
@@ -89,7 +89,7 @@ pub(crate) fn prefetch(
     max_bytes: u64,
     backend: &mut dyn Backend,
 ) -> Result<Uploaded, Error> {
-    let num = (max_bytes / brick_bytes(source, store)) as usize;
+    let num = (max_bytes / brick_bytes(source, store)).max(1) as usize;
     let nodes: Vec<Node> = missing(source.layout(), store, nodes, backend).take(num).collect();
     match upload_missing(source, &store.encoding, &nodes, backend) {
         Err(Error::Upload(UploadError::PoolFull { .. })) => Ok(Uploaded::default()),

@@ -257,6 +257,10 @@ impl Backend for WgpuBackend {
         self.jobs.take_told()
     }
 
+    fn wait(&mut self) -> Result<(), DrawError> {
+        self.jobs.wait(&self.gpu).map_err(device)
+    }
+
     fn finish(&mut self) -> Result<Drawn, DrawError> {
         let picture = self.picture.take().ok_or(DrawError::NoPicture)?;
         let drawn = self.finish.read(&self.gpu, &mut self.jobs, &picture).map_err(device)?;

@@ -130,6 +130,11 @@ impl Gpu {
         self.poll_as(wgpu::PollType::wait_indefinitely())
     }
 
+    /// Waits until the device has done what was submitted up to there.
+    pub(crate) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), Failure> {
+        self.poll_as(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })
+    }
+
     /// Hears what the device has done, without waiting.
     pub(crate) fn poll(&self) -> Result<(), Failure> {
         self.poll_as(wgpu::PollType::Poll)

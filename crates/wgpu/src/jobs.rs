@@ -42,6 +42,7 @@ pub(crate) struct Slip {
     pub(crate) worst: wgpu::Buffer,
     staging: wgpu::Buffer,
     is_done: Arc<AtomicBool>,
+    submission: Option<wgpu::SubmissionIndex>,
 }
 
 struct Stamps {
@@ -89,7 +90,7 @@ impl Jobs {
         gpu: &Gpu,
         encode: impl FnOnce(&mut wgpu::CommandEncoder, Clock<'_>, &Slip),
     ) {
-        let slip = self.free.pop().unwrap_or_else(|| Slip::new(gpu));
+        let mut slip = self.free.pop().unwrap_or_else(|| Slip::new(gpu));
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("volery picture") };
         let mut encoder = gpu.device.create_command_encoder(&descriptor);
         encoder.clear_buffer(&slip.worst, 0, None);
@@ -99,7 +100,7 @@ impl Jobs {
             encoder.copy_buffer_to_buffer(&stamps.resolved, 0, &slip.staging, 0, STAMP_BYTES);
         }
         encoder.copy_buffer_to_buffer(&slip.worst, 0, &slip.staging, STAMP_BYTES, DOUBT_BYTES);
-        gpu.queue.submit([encoder.finish()]);
+        slip.submission = Some(gpu.queue.submit([encoder.finish()]));
         let is_done = slip.is_done.clone();
         // A failure is the device's, which tells it elsewhere; then nothing is ever done.
         let done = move |result: Result<(), _>| is_done.store(result.is_ok(), Ordering::Release);
@@ -137,6 +138,13 @@ impl Jobs {
             self.told.extend(part.map(|number| FinishedPart { number, device_seconds: seconds }));
         }
         Ok(())
+    }
+
+    /// Waits for the first part that is not done.
+    pub(crate) fn wait(&mut self, gpu: &Gpu) -> Result<(), Failure> {
+        let part = self.pending.iter().find(|job| job.part.is_some());
+        let last = part.and_then(|job| job.slips.last()).and_then(|slip| slip.submission.clone());
+        last.map_or(Ok(()), |submission| gpu.wait_for(submission))
     }
 
     /// Parts that are done and were not told yet.
@@ -185,6 +193,7 @@ impl Slip {
                 wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             ),
             is_done: Arc::default(),
+            submission: None,
         }
     }
 

@@ -227,7 +227,6 @@ impl Picture {
             has_surfaces: (!self.surfaces.is_empty()).into(),
             background: self.view.background,
             stride: tile.stride,
-            ..bytemuck::Zeroable::zeroed()
         }
     }
 

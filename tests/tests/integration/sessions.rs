@@ -1,5 +1,6 @@
 //! Sessions of each kind of data: what stays, what a dial does, what is refused.
 
+mod deadlines;
 mod grids;
 mod moving;
 mod planes;

@@ -28,6 +28,10 @@ pub(super) fn conflict(args: &RenderArgs) -> Option<String> {
     if has_steps && args.save_scene.is_some() {
         return Some("--save-scene is for one picture, --time-steps makes several".to_owned());
     }
+    if args.path.is_some() && (has_steps || args.frames < 2) {
+        let found = if has_steps { "--time-steps is given" } else { "--frames is 1" };
+        return Some(format!("--path goes through --frames, of which there must be several, but {found}"));
+    }
     let is_series = args.frames > 1 && has_place(&args.output);
     let output = ("-o", Some(&args.output), has_steps || is_series);
     let others = [

@@ -69,8 +69,11 @@ pub(super) fn finish<D: Data>(
 ) -> Result<(), Failure> {
     let Run { args, wanted, input, .. } = run;
     name_sources(&mut picture.report, input);
-    let names = (0..args.frames as usize).map_while(|frame| numbered(&args.output, frame));
-    let mut outputs: Vec<PathBuf> = names.collect();
+    let num = args.frames as usize;
+    // Of a sequence the others are there.
+    let first = if run.is_sequence() { num - 1 } else { 0 };
+    let view = &args.view_at(view, num - 1);
+    let mut outputs: Vec<PathBuf> = (first..num).map_while(|frame| numbered(&args.output, frame)).collect();
     if outputs.is_empty() {
         outputs.push(args.output.clone());
     }

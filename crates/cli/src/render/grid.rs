@@ -11,8 +11,8 @@ use volery::{
     Backend, GridData, How, Picture, QuantizedMesh, Session, StackData, StackView, StepChange, View,
 };
 
-use super::Run;
 use super::files::{self, Done, Files};
+use super::{Run, frames};
 use crate::args::{RenderArgs, numbered};
 use crate::progress::Progress;
 use crate::{Failure, extent, say, wanted};
@@ -58,7 +58,7 @@ pub(super) fn run(
     }
     let picture = {
         let _busy = Progress::spinner("drawing");
-        session.render_frames(&view, args.frames as usize, backend).map_err(|error| of_file(&error))?
+        frames(run, &mut session, &view, backend)?
     };
     files::finish(run, &view, picture, &session)
 }
@@ -81,7 +81,7 @@ pub(super) fn run_stack(run: &Run, mesh: &QuantizedMesh, backend: &mut dyn Backe
     let view = wanted::view(args, wanted, input, &session, how)?;
     let picture = {
         let _busy = Progress::spinner("drawing");
-        session.render_frames(&view, args.frames as usize, backend).map_err(|error| of_file(&error))?
+        frames(run, &mut session, &view, backend)?
     };
     files::finish(run, &view, picture, &session)
 }

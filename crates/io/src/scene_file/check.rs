@@ -83,6 +83,16 @@ pub(super) fn tolerance<'de, D: Deserializer<'de>>(deserializer: D) -> Checked<f
     fraction(deserializer, "tolerance")
 }
 
+pub(super) fn budget<'de, D: Deserializer<'de>>(deserializer: D) -> Checked<f64, D::Error> {
+    let fits = |milliseconds: &f64| *milliseconds >= 0.0 && milliseconds.is_finite();
+    checked(deserializer, "budget_ms", fits, "a number of at least 0")
+}
+
+pub(super) fn gaze<'de, D: Deserializer<'de>>(deserializer: D) -> Checked<[f64; 2], D::Error> {
+    let fits = |gaze: &[f64; 2]| gaze.iter().all(|share| (0.0..=1.0).contains(share));
+    checked(deserializer, "gaze", fits, "two numbers in [0, 1]")
+}
+
 pub(super) fn error<'de, D: Deserializer<'de>>(deserializer: D) -> Checked<f64, D::Error> {
     fraction(deserializer, "error")
 }

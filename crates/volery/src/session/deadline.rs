@@ -22,7 +22,7 @@
 mod windows;
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use volery_frame::backend::MAX_STRIDE;
 use volery_frame::{Backend, Device, DeviceKind, Drawn, Image, PictureView, Window};
@@ -41,9 +41,6 @@ use windows::{Losses, STRIDES, Windows};
 
 /// Parts that a device may hold at one time: it never waits, and little is in its hands when time is up.
 const MAX_IN_FLIGHT: usize = 2;
-
-/// How long to sleep before looking again whether a device is done.
-const NAP: Duration = Duration::from_micros(50);
 
 /// Share of the budget that uploads may take.
 const UPLOAD_SHARE: f64 = 0.25;
@@ -236,7 +233,7 @@ impl<D: Data> Session<D> {
         while step != Step::Done || held.is_some() {
             in_flight.look(backend, &mut pace.scheduler, watch);
             if in_flight.parts.len() >= MAX_IN_FLIGHT {
-                std::thread::sleep(NAP);
+                backend.wait()?;
                 continue;
             }
             let mut parts: Vec<Part> = held.take().into_iter().collect();
@@ -253,7 +250,8 @@ impl<D: Data> Session<D> {
                 }
             });
             if parts.is_empty() {
-                std::thread::sleep(NAP);
+                // With nothing in flight this ends after one question for each part that was never told.
+                backend.wait()?;
                 continue;
             }
             let begun = watch.elapsed();
@@ -264,10 +262,8 @@ impl<D: Data> Session<D> {
             in_flight.parts.extend((first..).zip(&parts).map(|(number, part)| (number, part.id, begun)));
         }
         while !in_flight.parts.is_empty() {
+            backend.wait()?;
             in_flight.look(backend, &mut pace.scheduler, watch);
-            if !in_flight.parts.is_empty() {
-                std::thread::sleep(NAP);
-            }
         }
         let mut drawn = backend.finish()?;
         watch.control(|_| pace.learn(&drawn.image, &strides, view));
@@ -298,7 +294,8 @@ impl<D: Data> Session<D> {
             .collect();
         let pixels = f64::from(view.width) * f64::from(view.height);
         let level = |(error, &(rung, shrink)): (usize, &(usize, u32))| Level {
-            work: pixels * 0.5_f64.powi(rung as i32) / f64::from(shrink * shrink),
+            // Half for what is drawn, half for its pixels.
+            work: pixels * 0.5_f64.powi(rung as i32) * (0.5 + 0.5 / f64::from(shrink * shrink)),
             bytes: 0.0,
             error: error as f64,
         };

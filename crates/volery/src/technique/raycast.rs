@@ -40,11 +40,14 @@ pub(crate) struct Raycast {
 
 /// The last cuts of some tolerances, whatever is in view.
 #[derive(Debug, Default)]
-struct Cuts(Vec<(f64, Kept<(TransferFunction, Revision), Joined>)>);
+struct Cuts(Vec<(f64, KeptCut)>);
+
+/// Of a transfer function, in a store of the volume.
+type KeptCut = Kept<(TransferFunction, Revision), Joined>;
 
 impl Cuts {
     /// A tolerance that was never asked for drives out the one that was asked for longest ago.
-    fn of(&mut self, tolerance: f64) -> &mut Kept<(TransferFunction, Revision), Joined> {
+    fn of(&mut self, tolerance: f64) -> &mut KeptCut {
         let found = self.0.iter().position(|(of, _)| *of == tolerance);
         let kept = found.map(|place| self.0.remove(place)).unwrap_or_else(|| (tolerance, Kept::default()));
         self.0.truncate(TOLERANCES.len());

@@ -259,6 +259,10 @@ impl Backend for Narrow {
         vec![FinishedPart { number: 0, device_seconds: None }]
     }
 
+    fn wait(&mut self) -> Result<(), DrawError> {
+        Ok(())
+    }
+
     fn finish(&mut self) -> Result<Drawn, DrawError> {
         let [width, height] = self.size;
         let pixels = vec![[0.0; 3]; (width * height) as usize];
