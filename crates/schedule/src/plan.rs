@@ -22,7 +22,8 @@ pub enum Rule {
     /// By importance; what is left goes where it removes most error.
     #[default]
     Shares,
-    /// All of it goes where it removes most error times importance: greedily, from the coarsest levels on.
+    /// All of it goes where it removes most error times importance: greedily, from the coarsest levels on. Levels of the
+    /// last frame are not kept, but at rest.
     LeastError,
 }
 

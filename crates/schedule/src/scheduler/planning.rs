@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::plan::{Limit, Total};
+use crate::plan::{Limit, Rule, Total};
 
 use super::{Order, Scheduler};
 
@@ -51,7 +51,9 @@ impl Scheduler {
         let ideal = levels.clone();
         for (item, slot) in frame.slots.iter_mut().enumerate() {
             slot.chosen_importance = slot.importance;
-            let Some((kept, importance)) = slot.kept else { continue };
+            // Where errors are known a level beside the best one is worth less than rest.
+            let kept = slot.kept.filter(|_| settings.rule == Rule::Shares);
+            let Some((kept, importance)) = kept else { continue };
             let has_moved = (slot.importance - importance).abs() > settings.importance_threshold * importance;
             if !has_moved && kept < table.num_levels(item) && kept.abs_diff(ideal[item]) <= 1 {
                 levels[item] = kept;
