@@ -42,6 +42,7 @@ const GRAPH: [Rule; 17] = [
             "volery-pyramid",
             "volery-octree",
             "volery-cubefan",
+            "volery-schedule",
             "volery-slicing",
             "volery-frame",
             "volery-software",

@@ -27,9 +27,7 @@ use std::time::Instant;
 use volery_frame::backend::MAX_STRIDE;
 use volery_frame::{Backend, Device, DeviceKind, Drawn, Image, PictureView, Window};
 use volery_scene::Camera;
-use volery_schedule::{
-    Controller, Item, Level, Order, Part, Rule, Scheduler, Settings, Step, Summary, importance,
-};
+use volery_schedule::{Controller, Item, Level, Part, Rule, Scheduler, Settings, Step, Summary, importance};
 
 use super::{RenderError, Session};
 use crate::data::Data;
@@ -142,11 +140,7 @@ impl<D: Data> Session<D> {
             place,
             device,
             windows,
-            scheduler: Scheduler::new(Settings {
-                order: Order::LargestFirst,
-                rule: Rule::LeastError,
-                ..Settings::default()
-            }),
+            scheduler: Scheduler::new(Settings { rule: Rule::LeastError, ..Settings::default() }),
             secs_per_byte: FIRST_SECS_PER_BYTE,
             losses: None,
             camera: None,
