@@ -16,6 +16,9 @@
 //!   hundred parts; the mean of predictions stays, so that this and `pace` do not work against each other;
 //! - `per_byte` follows actual less what is predicted for the work, since uploads are rare and may be short.
 //!
+//! Where works are alike, what is fixed and what goes with work cannot be told apart, and a wrong answer keeps factors from
+//! being learned. A caller whose works count all that parts take says so ([`CostModel::proportional`]).
+//!
 //! # Robustness
 //! ln r is limited to +-0.5, so a part that took five times as long moves a prediction no more than one that took 1.65
 //! times as long. Five parts in a row that are off by more than half in the same direction are no spikes: `pace`
@@ -74,6 +77,7 @@ struct Factor {
 /// Learns what parts take, and predicts it.
 #[derive(Clone, Debug)]
 pub struct CostModel {
+    is_proportional: bool,
     fixed_secs: f64,
     secs_per_work: f64,
     secs_per_byte: f64,
@@ -93,6 +97,7 @@ pub struct CostModel {
 impl Default for CostModel {
     fn default() -> Self {
         CostModel {
+            is_proportional: false,
             fixed_secs: 0.0,
             secs_per_work: 0.0,
             secs_per_byte: FIRST_SECS_PER_BYTE,
@@ -119,6 +124,12 @@ impl CostModel {
     /// Whether a part was seen yet.
     pub fn is_calibrated(&self) -> bool {
         self.num_observed > 0
+    }
+
+    /// Of parts whose cost goes with their work alone, all that is the same in each included.
+    #[must_use]
+    pub fn proportional() -> Self {
+        CostModel { is_proportional: true, ..CostModel::default() }
     }
 
     /// Parts seen.
@@ -253,8 +264,9 @@ impl CostModel {
     fn calibrate(&mut self, work: f64, bytes: f64, secs: f64) {
         let rest = secs - (bytes * self.secs_per_byte).min(secs / 2.0);
         self.secs_per_byte = self.secs_per_byte.min(secs / 2.0 / bytes.max(1e-300));
-        self.fixed_secs = rest * FIRST_FIXED_PART;
-        self.secs_per_work = rest * (1.0 - FIRST_FIXED_PART) / if work > 0.0 { work } else { 1.0 };
+        let fixed_part = if self.is_proportional { 0.0 } else { FIRST_FIXED_PART };
+        self.fixed_secs = rest * fixed_part;
+        self.secs_per_work = rest * (1.0 - fixed_part) / if work > 0.0 { work } else { 1.0 };
     }
 
     /// Takes what the part took beyond its work for the upload. The logarithm is limited, so it is the median that is
@@ -270,6 +282,9 @@ impl CostModel {
 
     /// Shares costs out anew between fixed cost and work; what is predicted in the mean stays.
     fn rebalance(&mut self) {
+        if self.is_proportional {
+            return;
+        }
         if let Some([fixed_secs, secs_per_work]) = self.balance.solve([self.fixed_secs, self.secs_per_work]) {
             self.fixed_secs = limited(fixed_secs);
             self.secs_per_work = limited(secs_per_work);

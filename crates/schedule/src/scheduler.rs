@@ -84,6 +84,8 @@ pub struct Settings {
     pub order: Order,
     /// How the budget is shared out.
     pub rule: Rule,
+    /// Whether works count all that parts take, so that no cost is the same for parts of any work.
+    pub is_proportional: bool,
     /// How far from the budget a frame may end, relative to it. Parts that stall may take this much beyond the budget.
     pub tolerance: f64,
     /// A level stays while importance moved by less than this, relative to when it was chosen.
@@ -101,6 +103,7 @@ impl Default for Settings {
         Settings {
             order: Order::Kept,
             rule: Rule::Shares,
+            is_proportional: false,
             tolerance: 0.05,
             importance_threshold: 0.1,
             rest_threshold: 1e-3,
@@ -147,7 +150,8 @@ pub struct Scheduler {
 impl Scheduler {
     /// A scheduler that knows nothing yet.
     pub fn new(settings: Settings) -> Self {
-        Scheduler { settings, ..Scheduler::default() }
+        let model = if settings.is_proportional { CostModel::proportional() } else { CostModel::default() };
+        Scheduler { settings, model, ..Scheduler::default() }
     }
 
     /// What was learned of costs.

@@ -135,17 +135,21 @@ impl<D: Data> Session<D> {
         let mut watch = Watch { start: Instant::now(), control_secs: 0.0 };
         let (size, device) = ([view.width, view.height], backend.device());
         let windows = Windows::new(size);
+        let is_rays = self.techniques[place].0.has_windows();
         let is_same = |pace: &Pace| pace.place == place && pace.device == device && pace.windows == windows;
         let mut pace = self.pace.take().filter(is_same).unwrap_or_else(|| Pace {
             place,
             device,
             windows,
-            scheduler: Scheduler::new(Settings { rule: Rule::LeastError, ..Settings::default() }),
+            scheduler: Scheduler::new(Settings {
+                rule: Rule::LeastError,
+                is_proportional: is_rays,
+                ..Settings::default()
+            }),
             secs_per_byte: FIRST_SECS_PER_BYTE,
             losses: None,
             camera: None,
         });
-        let is_rays = self.techniques[place].0.has_windows();
         let paced = if is_rays {
             self.draw_windows(view, deadline, (&mut pace, &mut watch), backend)
         } else {
