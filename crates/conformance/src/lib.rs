@@ -251,6 +251,7 @@ mod tests {
             include_str!("surfaces.rs"),
             include_str!("parts.rs"),
             include_str!("outlines.rs"),
+            include_str!("windows.rs"),
         ];
         let written = sources.iter().flat_map(|text| text.lines());
         let written: Vec<_> = written.filter(|line| line.starts_with("pub fn ")).collect();
