@@ -206,14 +206,7 @@ impl<D: Data> Session<D> {
         plan: &Plan,
         backend: &mut dyn Backend,
     ) -> Result<Drawn, RenderError> {
-        let picture = PictureView {
-            width: view.width,
-            height: view.height,
-            camera: view.camera,
-            background: view.background.map(|c| c as f32),
-            meshes: &view.meshes,
-        };
-        Ok(backend.draw(&Frame { view: picture, content: plan.drawing.content() })?)
+        Ok(backend.draw(&Frame { view: picture_view(view), content: plan.drawing.content() })?)
     }
 
     /// What was drawn, and the report of it.
@@ -264,6 +257,17 @@ impl<D: Data> Session<D> {
             error,
         };
         Picture { image: drawn.image, report }
+    }
+}
+
+/// What a backend is told of a view.
+fn picture_view(view: &View) -> PictureView<'_> {
+    PictureView {
+        width: view.width,
+        height: view.height,
+        camera: view.camera,
+        background: view.background.map(|c| c as f32),
+        meshes: &view.meshes,
     }
 }
 

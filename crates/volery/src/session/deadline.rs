@@ -25,7 +25,7 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 use volery_frame::backend::MAX_STRIDE;
-use volery_frame::{Backend, Device, DeviceKind, Drawn, Image, PictureView, Window};
+use volery_frame::{Backend, Device, DeviceKind, Drawn, Image, Window};
 use volery_scene::Camera;
 use volery_schedule::{Controller, Item, Level, Part, Rule, Scheduler, Settings, Step, Summary, importance};
 
@@ -34,7 +34,7 @@ use crate::data::Data;
 use crate::report;
 use crate::residency::{self, Uploaded};
 use crate::technique::Plan;
-use crate::view::{Deadline, Dial, View};
+use crate::view::{Deadline, Dial, How, View};
 use windows::{Losses, STRIDES, Windows};
 
 /// Parts that a device may hold at one time: it never waits, and little is in its hands when time is up.
@@ -135,7 +135,7 @@ impl<D: Data> Session<D> {
         let mut watch = Watch { start: Instant::now(), control_secs: 0.0 };
         let (size, device) = ([view.width, view.height], backend.device());
         let windows = Windows::new(size);
-        let is_rays = self.techniques[place].0.has_windows();
+        let is_rays = matches!(view.how, How::Raycast);
         let is_same = |pace: &Pace| pace.place == place && pace.device == device && pace.windows == windows;
         let mut pace = self.pace.take().filter(is_same).unwrap_or_else(|| Pace {
             place,
@@ -221,7 +221,7 @@ impl<D: Data> Session<D> {
             }
             pace.scheduler.begin(deadline.budget_secs, &pace.items(&levels, deadline));
         });
-        backend.begin_windows(&picture_view(view), windows.side)?;
+        backend.begin_windows(&super::picture_view(view), windows.side)?;
         let content = plan.drawing.content();
         let mut strides = vec![MAX_STRIDE; windows.num() as usize];
         let mut in_flight =
@@ -383,16 +383,6 @@ impl Pace {
                 }
             }
         }
-    }
-}
-
-fn picture_view(view: &View) -> PictureView<'_> {
-    PictureView {
-        width: view.width,
-        height: view.height,
-        camera: view.camera,
-        background: view.background.map(|c| c as f32),
-        meshes: &view.meshes,
     }
 }
 

@@ -43,11 +43,6 @@ pub trait Technique<D>: Send {
     /// Lets go of what was made for the last view alone: several pictures of one are timed as if each were the first.
     fn forget_view(&mut self) {}
 
-    /// Whether a picture of it may be drawn in windows with a stride.
-    fn has_windows(&self) -> bool {
-        false
-    }
-
     /// A view in full resolution at one of its coarser levels of detail, from 1 on; `None` after the coarsest. What obeys
     /// deadlines has some.
     fn coarser(&self, view: &View, rung: usize) -> Option<View> {

@@ -71,10 +71,6 @@ impl Technique<VolumeData> for Raycast {
         volume.check_matter(&view.how)
     }
 
-    fn has_windows(&self) -> bool {
-        true
-    }
-
     fn coarser(&self, view: &View, rung: usize) -> Option<View> {
         coarser_by_tolerance(view, rung)
     }

@@ -162,7 +162,7 @@ impl Technique<StackData> for OfStack {
     }
 
     fn check(&self, stack: &StackData, view: &View) -> Result<(), RenderError> {
-        view.obeyed(|dial| dial == Dial::Full)?;
+        view.obeyed(|dial| matches!(dial, Dial::Full | Dial::Deadline(_)))?;
         if needs_gradients(view) && !stack.has_gradients() { Err(RenderError::NoGradients) } else { Ok(()) }
     }
 
