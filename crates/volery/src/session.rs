@@ -125,12 +125,12 @@ impl<D: Data> Session<D> {
                 let start = Instant::now();
                 let paced = self.draw_by(view, deadline, place, backend)?;
                 uploaded += paced.uploaded;
-                let draw = start.elapsed().as_secs_f64();
+                let (select, upload) = (paced.select_secs, paced.upload_secs);
                 times.push(Times {
-                    select: 0.0,
+                    select,
                     geometry: None,
-                    upload: None,
-                    draw,
+                    upload: paced.plan.store.is_some().then_some(upload),
+                    draw: start.elapsed().as_secs_f64() - select - upload,
                     paced: Some(paced.frame),
                 });
                 is_full = paced.is_full;

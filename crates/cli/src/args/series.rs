@@ -32,6 +32,10 @@ pub(super) fn conflict(args: &RenderArgs) -> Option<String> {
         let found = if has_steps { "--time-steps is given" } else { "--frames is 1" };
         return Some(format!("--path goes through --frames, of which there must be several, but {found}"));
     }
+    if args.progressive.is_some() && (args.path.is_some() || args.budget_ms.is_some()) {
+        let other = if args.path.is_some() { "--path" } else { "--budget-ms" };
+        return Some(format!("--progressive shows one view until it is full, expected it without {other}"));
+    }
     let is_series = args.frames > 1 && has_place(&args.output);
     let output = ("-o", Some(&args.output), has_steps || is_series);
     let others = [

@@ -73,6 +73,9 @@ pub(super) struct Paced {
     pub(super) plan: Plan,
     pub(super) drawn: Drawn,
     pub(super) uploaded: Uploaded,
+    /// Spent on plans, and on uploads.
+    pub(super) select_secs: f64,
+    pub(super) upload_secs: f64,
     pub(super) frame: report::PacedFrame,
     /// Whether nothing was left out.
     pub(super) is_full: bool,
@@ -167,14 +170,14 @@ impl<D: Data> Session<D> {
         view.map(|view| technique.plan(&mut self.data, &view)).transpose()
     }
 
-    /// The best plan whose bricks can be there in time, and which rung it is.
+    /// The best plan whose bricks can be there in time, which rung it is, what was uploaded and the seconds of that.
     fn resident_plan(
         &mut self,
         view: &View,
         budget_secs: f64,
         pace: &mut Pace,
         backend: &mut dyn Backend,
-    ) -> Result<(Plan, usize, Uploaded), RenderError> {
+    ) -> Result<(Plan, usize, Uploaded, f64), RenderError> {
         let most_bytes = UPLOAD_SHARE * budget_secs / pace.secs_per_byte;
         let (mut rung, mut finer) = (0, None);
         let mut plan = self.plan_of(view, rung, pace.place)?.ok_or(RenderError::NoFrame)?;
@@ -189,11 +192,12 @@ impl<D: Data> Session<D> {
             let left = (most_bytes - uploaded.bytes as f64).max(0.0) as u64;
             uploaded += residency::prefetch(source, store, nodes, left, backend)?;
         }
+        let upload_secs = start.elapsed().as_secs_f64();
         if uploaded.bricks > 0 {
-            let secs_per_byte = start.elapsed().as_secs_f64() / uploaded.bytes.max(1) as f64;
+            let secs_per_byte = upload_secs / uploaded.bytes.max(1) as f64;
             pace.secs_per_byte += 0.5 * (secs_per_byte - pace.secs_per_byte);
         }
-        Ok((plan, rung, uploaded))
+        Ok((plan, rung, uploaded, upload_secs))
     }
 
     /// Bytes of texels that a plan needs and a backend has not.
@@ -212,7 +216,9 @@ impl<D: Data> Session<D> {
         (pace, watch): (&mut Pace, &mut Watch),
         backend: &mut dyn Backend,
     ) -> Result<Paced, RenderError> {
-        let (plan, rung, uploaded) = self.resident_plan(view, deadline.budget_secs, pace, backend)?;
+        let (plan, rung, uploaded, upload_secs) =
+            self.resident_plan(view, deadline.budget_secs, pace, backend)?;
+        let select_secs = watch.elapsed() - upload_secs;
         let windows = pace.windows;
         let levels = pace.levels();
         watch.control(|_| {
@@ -272,7 +278,7 @@ impl<D: Data> Session<D> {
         let pixels = f64::from(view.width) * f64::from(view.height);
         let is_full = rung == 0 && strides.iter().all(|&stride| stride == 1);
         let frame = paced_frame(&summary, watch, (num_rays / pixels).min(1.0), rung);
-        Ok(Paced { plan, drawn, uploaded, frame, is_full })
+        Ok(Paced { plan, drawn, uploaded, select_secs, upload_secs, frame, is_full })
     }
 
     /// Draws planes or a stack at one of several levels, whole.
@@ -300,13 +306,17 @@ impl<D: Data> Session<D> {
         let levels: Vec<_> = choices.iter().enumerate().map(level).collect();
         let item = Item { key: 0, importance: 1.0, levels: &levels };
         watch.control(|_| pace.scheduler.begin(deadline.budget_secs, &[item]));
+        let (mut select_secs, mut upload_secs) = (0.0, 0.0);
         let mut last = None;
         let mut uploaded = Uploaded::default();
         while let Step::Draw(part) = watch.control(|now| pace.scheduler.next(now)) {
             let begun = watch.elapsed();
             let (rung, shrink) = choices[part.level];
             let plan = self.plan_of(view, rung, pace.place)?.ok_or(RenderError::NoFrame)?;
+            let planned = watch.elapsed();
             uploaded += self.upload(&plan, backend)?;
+            select_secs += planned - begun;
+            upload_secs += watch.elapsed() - planned;
             let small = View {
                 width: view.width.div_ceil(shrink),
                 height: view.height.div_ceil(shrink),
@@ -322,7 +332,8 @@ impl<D: Data> Session<D> {
         }
         let summary = pace.scheduler.finish(watch.elapsed());
         let frame = paced_frame(&summary, watch, f64::from(shrink * shrink).recip(), rung);
-        Ok(Paced { plan, drawn, uploaded, frame, is_full: rung == 0 && shrink == 1 })
+        let is_full = rung == 0 && shrink == 1;
+        Ok(Paced { plan, drawn, uploaded, select_secs, upload_secs, frame, is_full })
     }
 }
 

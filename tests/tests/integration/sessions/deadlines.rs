@@ -33,6 +33,8 @@ fn with_time_enough_a_picture_is_that_of_full_resolution() {
         for frame in 0..6 {
             let picture = session.render(&by(&view, ENOUGH_SECS), &mut backend).unwrap();
             let paced = picture.report.frames[0].paced.unwrap();
+            let seconds = picture.report.seconds;
+            assert!(seconds.select > 0.0 && seconds.upload.is_some() && seconds.draw > 0.0, "{seconds:?}");
             println!("{} {frame}: {paced:?}", view.how.name());
             if frame > 0 {
                 assert_eq!(picture.image, full.image, "{} {frame}", view.how.name());
