@@ -44,7 +44,9 @@ const PACE_GAINS: [f64; 2] = [0.005, 0.1];
 const TRENDS: [f64; 2] = [0.1, 0.3];
 const TREND_GAIN: f64 = 0.1;
 const MIN_UPLOAD_GAIN: f64 = 0.02;
-const MIN_FACTOR_GAIN: f64 = 0.08;
+/// Of an item's own factor, where costs are fixed in part, and where they go with the work alone: then nothing else can
+/// follow what moves through an item.
+const MIN_FACTOR_GAINS: [f64; 2] = [0.08, 0.3];
 /// Parts in a row that say that the device's speed is another, and by how much each must.
 const NUM_IN_A_ROW: usize = 5;
 const JUMP_RATIO: f64 = 1.5;
@@ -254,7 +256,7 @@ impl CostModel {
     fn learn_factor(&mut self, key: u64, work_part: f64, log: f64) {
         let frame = self.frame;
         let factor = self.factors.entry(key).or_insert(Factor { ratio: 1.0, num_seen: 0, last_frame: frame });
-        let gain = MIN_FACTOR_GAIN.max(0.6 / f64::from(factor.num_seen + 1));
+        let gain = MIN_FACTOR_GAINS[usize::from(self.is_proportional)].max(0.6 / f64::from(factor.num_seen + 1));
         factor.ratio = (factor.ratio * (gain * work_part * log).exp()).clamp(1e-3, 1e3);
         factor.num_seen = (factor.num_seen + 1).min(1000);
         factor.last_frame = frame;

@@ -158,14 +158,24 @@ impl Table {
 
     /// Items made finer while the limit holds, those that gain most per second first.
     pub(crate) fn refine(&self, limit: &Limit, levels: &mut [usize]) {
-        let cost =
-            |levels: &[usize], item: usize| self.levels_of(item).get(levels[item]).copied().unwrap_or(0.0);
-        let mut sum: f64 = (0..self.len()).map(|item| cost(levels, item)).sum();
-        let mut squares: f64 = (0..self.len()).map(|item| cost(levels, item).powi(2)).sum();
+        let cost = |item: usize| self.levels_of(item).get(levels[item]).copied().unwrap_or(0.0);
+        let sum = (0..self.len()).map(cost).sum();
+        let squares = (0..self.len()).map(|item| cost(item).powi(2)).sum();
+        self.refine_some(limit, (sum, squares), 0..self.len(), levels);
+    }
+
+    /// Some items made finer, where the sum of costs and of their squares are these.
+    fn refine_some(
+        &self,
+        limit: &Limit,
+        (mut sum, mut squares): (f64, f64),
+        items: impl Iterator<Item = usize>,
+        levels: &mut [usize],
+    ) {
         let mut heap: BinaryHeap<Candidate> =
-            (0..self.len()).filter_map(|item| self.candidate(item, levels[item])).collect();
+            items.filter_map(|item| self.candidate(item, levels[item])).collect();
         while let Some(Candidate { item: Reverse(item), secs: Reverse(Total(secs)), .. }) = heap.pop() {
-            let old = cost(levels, item);
+            let old = self.levels_of(item).get(levels[item]).copied().unwrap_or(0.0);
             let (new_sum, new_squares) = (sum - old + secs, squares - old.powi(2) + secs.powi(2));
             if limit.holds(new_sum, new_squares) {
                 (sum, squares) = (new_sum, new_squares);
@@ -173,6 +183,16 @@ impl Table {
                 heap.extend(self.candidate(item, levels[item]));
             }
         }
+    }
+
+    /// The least error that a budget allows for some of the items, from their coarsest levels on.
+    pub(crate) fn plan_rest(&self, budget_secs: f64, items: &[usize], levels: &mut [usize]) {
+        let mut sum = 0.0;
+        for &item in items {
+            levels[item] = self.num_levels(item).saturating_sub(1);
+            sum += self.floor_secs(item);
+        }
+        self.refine_some(&Limit { budget_secs, sigmas: 0.0 }, (sum, 0.0), items.iter().copied(), levels);
     }
 
     /// Levels within a limit.

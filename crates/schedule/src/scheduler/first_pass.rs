@@ -1,6 +1,6 @@
 //! The first pass: every item once, near the plan.
 
-use crate::plan::nearest;
+use crate::plan::{Rule, nearest};
 
 use super::Scheduler;
 use crate::item::Step;
@@ -14,9 +14,10 @@ impl Scheduler {
     /// Draws the next item, or waits for what is in flight where that would save its level.
     pub(super) fn next_in_first_pass(&mut self) -> Step {
         let item = self.frame.order[self.frame.position];
-        let level = match self.settled_level(item) {
-            Some(level) => level,
-            None => {
+        let level = match (self.settled_level(item), self.settings.rule) {
+            (Some(level), _) => level,
+            (None, Rule::LeastError) => self.level_of_least_error(item),
+            (None, Rule::Shares) => {
                 let level = self.level_near_plan(item, self.in_flight_secs());
                 let may_wait = !self.frame.in_flight.is_empty() && !self.frame.has_waited;
                 if may_wait && self.level_near_plan(item, 0.0) < level {
@@ -28,6 +29,24 @@ impl Scheduler {
         };
         self.frame.position += 1;
         self.draw(item, level)
+    }
+
+    /// The level of least error for the time that is left, all other items that are left counted; a coarser one where a
+    /// stall of this part would make the frame late.
+    fn level_of_least_error(&mut self, item: usize) -> usize {
+        let coarsest = self.frame.table.num_levels(item).saturating_sub(1);
+        if !self.model.is_calibrated() {
+            return coarsest;
+        }
+        let (scale, left_secs) = (self.scale(), self.left_secs());
+        let frame = &mut self.frame;
+        if std::mem::take(&mut frame.is_plan_old) {
+            frame.table.plan_rest(left_secs / scale, &frame.order[frame.position..], &mut frame.planned);
+        }
+        let after_secs = scale * frame.remaining[frame.position + 1].floor_secs;
+        let longest_secs = (left_secs - after_secs + self.slack_secs()) / (scale * self.spread());
+        let costs = self.frame.table.levels_of(item);
+        (self.frame.planned[item]..coarsest).find(|&level| costs[level] <= longest_secs).unwrap_or(coarsest)
     }
 
     /// The level that brings the frame back to its plan, if parts in flight stall no more than `in_flight_secs` can.

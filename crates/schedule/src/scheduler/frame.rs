@@ -64,6 +64,8 @@ pub(super) struct Frame {
     pub(super) remaining: Vec<Remaining>,
     /// Levels planned, by item.
     pub(super) planned: Vec<usize>,
+    /// Whether something was seen since.
+    pub(super) is_plan_old: bool,
     /// What it takes to make those finer that are held back, in the table's units.
     pub(super) held_secs: f64,
     /// Levels that rest has settled on, by item; empty where it has not.
@@ -116,6 +118,7 @@ impl Frame {
         self.order.clear();
         self.position = 0;
         self.planned.clear();
+        self.is_plan_old = false;
         self.held_secs = 0.0;
         self.settled.clear();
         self.is_settled = false;
@@ -197,7 +200,7 @@ impl Frame {
         let secs = if secs.is_finite() { sane_secs(secs) } else { 0.0 };
         self.observed_secs += secs;
         self.last_end_secs += secs;
-        self.has_news = true;
+        (self.has_news, self.is_plan_old) = (true, true);
         self.has_waited = false;
     }
 

@@ -26,7 +26,7 @@ impl Scheduler {
             frame.order.clear();
             frame.order.extend(by_cost.iter().rev());
         }
-        if !frame.is_settled {
+        if !frame.is_settled && self.settings.rule == Rule::Shares {
             self.hold_back(&by_cost);
         }
         self.frame.sum_remaining();

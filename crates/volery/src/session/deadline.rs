@@ -220,20 +220,21 @@ impl<D: Data> Session<D> {
             self.resident_plan(view, deadline.budget_secs, pace, backend)?;
         let select_secs = watch.elapsed() - upload_secs;
         let windows = pace.windows;
-        let levels = pace.levels();
+        let order = windows.scattered();
+        let levels = pace.levels(&order);
         watch.control(|_| {
             if pace.camera != Some(view.camera) {
                 pace.scheduler.disturb();
             }
-            pace.scheduler.begin(deadline.budget_secs, &pace.items(&levels, deadline));
+            pace.scheduler.begin(deadline.budget_secs, &pace.items(&order, &levels, deadline));
         });
         backend.begin_windows(&super::picture_view(view), windows.side)?;
         let content = plan.drawing.content();
         let mut strides = vec![MAX_STRIDE; windows.num() as usize];
         let mut in_flight =
             InFlight { parts: VecDeque::new(), last_done: 0.0, is_at_once: pace.is_at_once() };
-        let batch = pace.batch();
         let (mut step, mut held) = (Step::Wait, None);
+        let mut num_left = order.len();
         while step != Step::Done || held.is_some() {
             in_flight.look(backend, &mut pace.scheduler, watch);
             if in_flight.parts.len() >= MAX_IN_FLIGHT {
@@ -241,6 +242,7 @@ impl<D: Data> Session<D> {
                 continue;
             }
             let mut parts: Vec<Part> = held.take().into_iter().collect();
+            let batch = pace.batch(num_left);
             watch.control(|now| {
                 while parts.len() < batch && step != Step::Done {
                     step = pace.scheduler.next(now);
@@ -258,8 +260,9 @@ impl<D: Data> Session<D> {
                 backend.wait()?;
                 continue;
             }
+            num_left = num_left.saturating_sub(parts.len());
             let begun = watch.elapsed();
-            let window = |part: &Part| Window { number: part.item as u32, stride: STRIDES[part.level] };
+            let window = |part: &Part| Window { number: order[part.item], stride: STRIDES[part.level] };
             let list: Vec<Window> = parts.iter().map(window).collect();
             list.iter().for_each(|window| strides[window.number as usize] = window.stride);
             let first = backend.draw_windows(&content, &list)?;
@@ -343,13 +346,14 @@ impl Pace {
         self.device.kind == DeviceKind::Software
     }
 
-    /// Parts that are handed out at one time: so many that no thread has nothing to do, or one.
-    fn batch(&self) -> usize {
-        if self.is_at_once() { 2 * rayon::current_num_threads() } else { 1 }
+    /// Parts that are handed out at one time where so many are left: a third, since threads wait for each other at the
+    /// end of each time, and at least so many that none has nothing to do; or one.
+    fn batch(&self, num_left: usize) -> usize {
+        if self.is_at_once() { (num_left / 3).max(2 * rayon::current_num_threads()) } else { 1 }
     }
 
-    /// The levels of all windows, one after the other.
-    fn levels(&self) -> Vec<Level> {
+    /// The levels of all windows, one after the other in this order.
+    fn levels(&self, order: &[u32]) -> Vec<Level> {
         let level = |window: u32, place: usize| {
             let [pixels, rays] = [1, STRIDES[place]].map(|stride| self.windows.num_rays(window, stride));
             let loss = self.losses.as_ref().map(|losses| losses[window as usize][place]);
@@ -357,15 +361,14 @@ impl Pace {
             // What counts is the sum of squares over pixels.
             Level { work: rays + APART * pixels, bytes: 0.0, error: pixels * loss.powi(2) }
         };
-        (0..self.windows.num())
-            .flat_map(|window| (0..STRIDES.len()).map(move |place| level(window, place)))
-            .collect()
+        let places = 0..STRIDES.len();
+        order.iter().flat_map(|&window| places.clone().map(move |place| level(window, place))).collect()
     }
 
-    fn items<'a>(&self, levels: &'a [Level], deadline: Deadline) -> Vec<Item<'a>> {
+    fn items<'a>(&self, order: &[u32], levels: &'a [Level], deadline: Deadline) -> Vec<Item<'a>> {
         let size = self.windows.size.map(f64::from);
         let radius = GAZE_RADIUS * size[0].hypot(size[1]);
-        let item = |(window, levels): (u32, &'a [Level])| {
+        let item = |(&window, levels): (&u32, &'a [Level])| {
             let [first, last] = self.windows.bounds(window);
             let centre = [0, 1].map(|axis| 0.5 * f64::from(first[axis] + last[axis]));
             let near = deadline
@@ -373,7 +376,7 @@ impl Pace {
                 .map_or(1.0, |gaze| importance::gaze([gaze[0] * size[0], gaze[1] * size[1]], centre, radius));
             Item { key: u64::from(window), importance: near, levels }
         };
-        (0..).zip(levels.chunks(STRIDES.len())).map(item).collect()
+        order.iter().zip(levels.chunks(STRIDES.len())).map(item).collect()
     }
 
     /// Foresees what the next picture would lose from what this one shows.

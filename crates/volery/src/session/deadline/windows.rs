@@ -51,6 +51,16 @@ impl Windows {
         self.across() * self.size[1].div_ceil(self.side)
     }
 
+    /// All windows, so that those drawn one after the other lie far apart: what time then is wrong by, it is wrong by
+    /// all over the picture, and not from some row on.
+    pub(super) fn scattered(&self) -> Vec<u32> {
+        let num = self.num();
+        // Near the golden section, which leaves gaps as equal as can be.
+        let from = (f64::from(num) * 0.618) as u32;
+        let step = (from.max(1)..).find(|&step| gcd(step, num) == 1).unwrap_or(1);
+        (0..num).map(|place| (u64::from(place) * u64::from(step) % u64::from(num)) as u32).collect()
+    }
+
     /// First and last pixel along x and y, the last not included.
     pub(super) fn bounds(&self, window: u32) -> [[u32; 2]; 2] {
         let first = [window % self.across() * self.side, window / self.across() * self.side];
@@ -155,6 +165,10 @@ impl Windows {
     }
 }
 
+fn gcd(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
 /// The pixels with a ray around another along an axis of so many: at the edges twice the same.
 fn around(pixel: u32, stride: u32, num: u32) -> [u32; 2] {
     let half = stride / 2;
@@ -242,6 +256,21 @@ mod tests {
             }
         }
         assert_ne!(image, before);
+    }
+
+    #[test]
+    fn scattered_windows_are_all_once_and_far_apart() {
+        for size in [[1, 1], [33, 7], [512, 512], [1920, 1080], [511, 2000]] {
+            let windows = Windows::new(size);
+            let order = windows.scattered();
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..windows.num()).collect::<Vec<_>>(), "{size:?}");
+            // The first quarter leaves no half of the picture out.
+            let quarter = &order[..order.len() / 4];
+            let upper = quarter.iter().filter(|&&window| window < windows.num() / 2).count();
+            assert!(upper.abs_diff(quarter.len() - upper) <= 2, "{size:?}: {upper} of {}", quarter.len());
+        }
     }
 
     #[test]
