@@ -62,6 +62,8 @@ pub(crate) struct Pace {
     windows: Windows,
     scheduler: Scheduler,
     secs_per_byte: f64,
+    /// Room for a picture.
+    shown: Vec<[f32; 3]>,
     /// Of each window, from the last picture.
     losses: Option<Vec<Losses>>,
     /// Of the last picture.
@@ -150,6 +152,7 @@ impl<D: Data> Session<D> {
                 ..Settings::default()
             }),
             secs_per_byte: FIRST_SECS_PER_BYTE,
+            shown: Vec::new(),
             losses: None,
             camera: None,
         });
@@ -274,7 +277,7 @@ impl<D: Data> Session<D> {
         }
         let mut drawn = backend.finish()?;
         watch.control(|_| pace.learn(&drawn.image, &strides, view));
-        windows.interpolate(&mut drawn.image, &strides);
+        windows.interpolate(&mut drawn.image, &strides, &mut pace.shown);
         let summary = pace.scheduler.finish(watch.elapsed());
         let num_rays: f64 =
             (0..).zip(&strides).map(|(window, &stride)| windows.num_rays(window, stride)).sum();

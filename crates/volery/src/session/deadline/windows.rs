@@ -78,25 +78,26 @@ impl Windows {
         strides[(y / self.side * self.across() + x / self.side) as usize]
     }
 
-    /// Puts interpolated colours between the rays of windows with such strides.
-    pub(super) fn interpolate(&self, image: &mut Image, strides: &[u32]) {
+    /// Puts interpolated colours between the rays of windows with such strides. `shown` is room for a copy.
+    pub(super) fn interpolate(&self, image: &mut Image, strides: &[u32], shown: &mut Vec<[f32; 3]>) {
         if strides.iter().all(|&stride| stride == 1) {
             return;
         }
-        let shown = image.pixels.clone();
+        shown.resize(image.pixels.len(), [0.0; 3]);
+        shown.par_iter_mut().zip(&image.pixels).with_min_len(1 << 14).for_each(|(to, from)| *to = *from);
         let [width, height] = self.size;
         let side = self.side as usize;
-        image.pixels.par_chunks_mut(width as usize).zip(0..height).for_each(|(row, y)| {
+        image.pixels.par_chunks_mut(width as usize).zip(0..height).with_min_len(8).for_each(|(row, y)| {
             for (first, pixels) in (0..width).step_by(side).zip(row.chunks_mut(side)) {
                 let stride = self.stride_at(strides, [first, y]);
                 if stride > 1 {
-                    self.interpolate_row(&shown, (first, y), stride, pixels);
+                    self.interpolate_row(shown, (first, y), stride, pixels);
                 }
             }
         });
     }
 
-    /// Interpolates a row of a window.
+    /// Interpolates a row of a window, from ray to ray.
     fn interpolate_row(
         &self,
         shown: &[[f32; 3]],
@@ -105,23 +106,27 @@ impl Windows {
         pixels: &mut [[f32; 3]],
     ) {
         let [width, height] = self.size;
-        let [above, below] = around(y, stride, height);
-        let down = share(y, above, stride);
-        let column = |x: u32| {
-            let [a, b] = [above, below].map(|y| shown[(y * width + x) as usize]);
-            [0, 1, 2].map(|channel| a[channel] + down * (b[channel] - a[channel]))
-        };
-        let mut ends = around(first, stride, width);
-        let mut colors = ends.map(column);
-        for (x, pixel) in (first..).zip(pixels) {
-            let found = around(x, stride, width);
-            if found != ends {
-                ends = found;
-                colors = ends.map(column);
+        let [above, below] =
+            around(y, stride, height).map(|y| &shown[(y * width) as usize..][..width as usize]);
+        let down = share(y, around(y, stride, height)[0], stride);
+        let column = |x: u32| mix(above[x as usize], below[x as usize], down);
+        let half = (stride / 2) as usize;
+        // From the middle of a square to that of the next all lie between the same two rays: half a square comes first.
+        let (start, rest) = pixels.split_at_mut(half.min(pixels.len()));
+        let [left, right] = around(first, stride, width);
+        let mut colors = [column(left), column(right)];
+        let fill = |pixels: &mut [[f32; 3]], x: u32, left: u32, colors: [[f32; 3]; 2]| {
+            for (x, pixel) in (x..).zip(pixels) {
+                *pixel = mix(colors[0], colors[1], share(x, left, stride));
             }
-            let right = share(x, ends[0], stride);
-            *pixel = [0, 1, 2]
-                .map(|channel| colors[0][channel] + right * (colors[1][channel] - colors[0][channel]));
+        };
+        fill(start, first, left, colors);
+        for (x, pixels) in
+            (first + stride / 2..).step_by(stride as usize).zip(rest.chunks_mut(stride as usize))
+        {
+            let [left, right] = around(x, stride, width);
+            colors = [colors[1], column(right)];
+            fill(pixels, x, left, colors);
         }
     }
 
@@ -163,6 +168,10 @@ impl Windows {
         }
         (sum / f64::from(num.max(1))).sqrt()
     }
+}
+
+fn mix(a: [f32; 3], b: [f32; 3], share: f32) -> [f32; 3] {
+    [0, 1, 2].map(|channel| a[channel] + share * (b[channel] - a[channel]))
 }
 
 fn gcd(a: u32, b: u32) -> u32 {
@@ -228,7 +237,7 @@ mod tests {
             for stride in STRIDES {
                 let strides = vec![stride; windows.num() as usize];
                 let mut image = drawn(&windows, &strides, ramp);
-                windows.interpolate(&mut image, &strides);
+                windows.interpolate(&mut image, &strides, &mut Vec::new());
                 let inner = |place: u32, num: u32| place >= stride / 2 && place + stride < num;
                 for (place, pixel) in (0..).zip(&image.pixels) {
                     let at = [place % size[0], place / size[0]];
@@ -248,7 +257,7 @@ mod tests {
         let strides: Vec<u32> = (0..windows.num()).map(|window| 1 << (window % 4)).collect();
         let mut image = drawn(&windows, &strides, noise);
         let before = image.clone();
-        windows.interpolate(&mut image, &strides);
+        windows.interpolate(&mut image, &strides, &mut Vec::new());
         for window in (0..windows.num()).filter(|window| window % 4 == 0) {
             let [[x0, y0], [x1, y1]] = windows.bounds(window);
             for place in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (y * 160 + x) as usize)) {
