@@ -256,7 +256,8 @@ impl CostModel {
     fn learn_factor(&mut self, key: u64, work_part: f64, log: f64) {
         let frame = self.frame;
         let factor = self.factors.entry(key).or_insert(Factor { ratio: 1.0, num_seen: 0, last_frame: frame });
-        let gain = MIN_FACTOR_GAINS[usize::from(self.is_proportional)].max(0.6 / f64::from(factor.num_seen + 1));
+        let gain =
+            MIN_FACTOR_GAINS[usize::from(self.is_proportional)].max(0.6 / f64::from(factor.num_seen + 1));
         factor.ratio = (factor.ratio * (gain * work_part * log).exp()).clamp(1e-3, 1e3);
         factor.num_seen = (factor.num_seen + 1).min(1000);
         factor.last_frame = frame;

@@ -13,7 +13,8 @@
 //! 2. *First pass* (`first_pass`). Every item once. A frame that is ahead of its plan or behind it comes back by moving the
 //!    next levels, at most by what they are planned to take; some cheap items are held back, drawn one level coarser, and
 //!    made finer at the end, so that noise takes from them first. Before each part, the time that all others need at their
-//!    coarsest is kept, with a margin.
+//!    coarsest is kept, with a margin. With [`Rule::LeastError`] none is held back: as costs become known, what is left is
+//!    planned anew for the time that is left.
 //! 3. *Refinement* (`refine`). While time is left, the item is drawn again whose next level removes most error * importance
 //!    per second, as far as planned; finer than planned only if more than 2 % of the budget would be left.
 //!
