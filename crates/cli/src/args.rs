@@ -132,6 +132,10 @@ pub(crate) struct RenderArgs {
     #[arg(long, help_heading = "Output", value_name = "OUT.png",
         value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["png", "exr"])))]
     pub(crate) error_map: Option<PathBuf>,
+    /// Write how far each pixel can be from the exact picture, computed without it and amplified as printed; of raycast
+    #[arg(long, help_heading = "Output", value_name = "OUT.png",
+        value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["png", "exr"])))]
+    pub(crate) bound_map: Option<PathBuf>,
     /// Write input, times, work and error as JSON
     #[arg(long, help_heading = "Output", value_name = "OUT.json")]
     pub(crate) report: Option<PathBuf>,
@@ -243,8 +247,11 @@ impl RenderArgs {
 
     /// An option that is given, and means nothing for grids, beside those of other techniques.
     pub(crate) fn unread_by_stack(&self) -> Option<&'static str> {
-        let others =
-            [("--tolerance", self.tolerance.is_some()), ("--progressive", self.progressive.is_some())];
+        let others = [
+            ("--tolerance", self.tolerance.is_some()),
+            ("--progressive", self.progressive.is_some()),
+            ("--bound-map", self.bound_map.is_some()),
+        ];
         others.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name)
     }
 }

@@ -91,6 +91,7 @@ fn outputs(args: &RenderArgs, num_steps: usize) -> Outputs {
     let named = [
         ("-o", Some(args.output.as_path())),
         ("--error-map", args.error_map.as_deref()),
+        ("--bound-map", args.bound_map.as_deref()),
         ("--report", args.report.as_deref()),
         ("--save-scene", args.save_scene.as_deref()),
     ];
@@ -157,7 +158,7 @@ fn run_volume(run: &Run, grid: &VoxelGrid, backend: &mut dyn Backend) -> Result<
         let _busy = Progress::spinner("drawing");
         frames(run, &mut session, &view, backend)?
     };
-    files::finish(run, &view, picture, &session)?;
+    files::finish(run, &view, picture, &mut session)?;
     if let Some(option) = because {
         say(format_args!("note: drawn by --technique plane, which alone reads {option}"))?;
     }

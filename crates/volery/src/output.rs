@@ -4,6 +4,8 @@ use std::path::Path;
 
 use volery_io::{WriteError, write_exr, write_png};
 
+use crate::matter_bound::MatterBound;
+
 /// Writes a picture as the ending of its name says: `.exr` in 32-bit floats, anything else as PNG of 8 bits.
 ///
 /// # Errors
@@ -14,7 +16,7 @@ pub fn write_image(path: &Path, image: &volery_frame::Image) -> Result<(), Write
     write(path, image.width, image.height, &image.pixels)
 }
 
-/// The map of errors of a picture: `|picture - truth|` per channel, times a gain.
+/// The map of errors of a picture, or of what bounds them, per channel, times a gain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
     /// The amplified differences, in [0, 1].
@@ -38,10 +40,21 @@ impl ErrorMap {
                 let left = [size.width, size.height];
                 volery_reference::metrics::Error { left, right: [truth.width(), truth.height()] }
             })?;
-        let largest = volery_reference::metrics::compare(&drawn, truth)?.max;
-        let gain = if largest > 0.0 { (-largest.log2()).floor().clamp(0.0, 20.0).exp2() } else { 1.0 };
+        let gain = gain(volery_reference::metrics::compare(&drawn, truth)?.max);
         let map = volery_reference::metrics::difference(&drawn, truth, gain)?;
         let pixels = map.pixels().iter().map(|pixel| pixel.map(|channel| channel as f32)).collect();
         Ok(Self { image: volery_frame::Image { width: map.width(), height: map.height(), pixels }, gain })
     }
+
+    /// Shows bounds; the gain as for differences.
+    pub fn of_bound(bound: &MatterBound) -> Self {
+        let gain = gain(bound.max());
+        let pixels = bound.pixels.iter().map(|pixel| pixel.map(|bound| bound * gain as f32)).collect();
+        Self { image: volery_frame::Image { width: bound.width, height: bound.height, pixels }, gain }
+    }
+}
+
+/// The largest power of two, up to 2^20, that keeps an error within 1.
+fn gain(largest: f64) -> f64 {
+    if largest > 0.0 { (-largest.log2()).floor().clamp(0.0, 20.0).exp2() } else { 1.0 }
 }

@@ -245,7 +245,10 @@ pub struct Error {
     /// separates that picture from the truth (rounding to texels, and of `f32`) comes on top.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound_max: Option<f64>,
-    /// What `bound_max` is against.
+    /// The root mean square over all pixels of what they may differ by: no rmse is above it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound_rms: Option<f64>,
+    /// What the bounds are against.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound_against: Option<&'static str>,
     /// Of rays: what each stage may add to the distance from the exact picture of the field that is drawn.

@@ -17,6 +17,7 @@ use volery_reference::metrics;
 use volery_scene::TransferFunction;
 
 use crate::data::Data;
+use crate::matter_bound::MatterBound;
 use crate::ray_budget::RayBudget;
 use crate::report::{self, Report};
 use crate::residency::{self, Uploaded};
@@ -177,6 +178,24 @@ impl<D: Data> Session<D> {
         let truth = technique.truth(&self.data, view, progress)?;
         picture.measure(&truth)?;
         Ok(truth)
+    }
+
+    /// Finds how far each pixel of a picture of these data can be from the exact picture, and writes the largest and the
+    /// root mean square into the picture's report. Needs no truth.
+    ///
+    /// # Errors
+    /// When the technique has no such bounds, or bricks cannot be read.
+    pub fn certify(&mut self, view: &View, picture: &mut Picture) -> Result<MatterBound, RenderError> {
+        let place = self.check(view)?;
+        let bound = self.techniques[place].0.bound(&mut self.data, view)?.ok_or(RenderError::NoBound {
+            technique: view.how.name(),
+            has_deadline: matches!(view.dial, Dial::Deadline(_)),
+        })?;
+        let error = picture.report.error.get_or_insert_default();
+        error.bound_max = Some(bound.max());
+        error.bound_rms = Some(bound.rms());
+        error.bound_against = Some("the exact picture, what `budget` says on top");
+        Ok(bound)
     }
 
     /// The place of the technique of a view that can be drawn.

@@ -40,6 +40,7 @@ pub(super) fn conflict(args: &RenderArgs) -> Option<String> {
     let output = ("-o", Some(&args.output), has_steps || is_series);
     let others = [
         ("--error-map", args.error_map.as_ref(), has_steps),
+        ("--bound-map", args.bound_map.as_ref(), has_steps),
         ("--report", args.report.as_ref(), has_steps),
         ("--save-scene", args.save_scene.as_ref(), false),
     ];

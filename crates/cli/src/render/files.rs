@@ -65,7 +65,7 @@ pub(super) fn finish<D: Data>(
     run: &Run,
     view: &View,
     mut picture: Picture,
-    session: &Session<D>,
+    session: &mut Session<D>,
 ) -> Result<(), Failure> {
     let Run { args, wanted, input, .. } = run;
     name_sources(&mut picture.report, input);
@@ -77,10 +77,20 @@ pub(super) fn finish<D: Data>(
     if outputs.is_empty() {
         outputs.push(args.output.clone());
     }
+    let mut bounds = None;
+    if let Some(path) = &args.bound_map {
+        let _busy = Progress::spinner("bounding the error");
+        let bound = session.certify(view, &mut picture)?;
+        let map = ErrorMap::of_bound(&bound);
+        write_image(path, &map.image)?;
+        bounds = Some(format!("{}: bound of |picture - exact picture| x {}", path.display(), map.gain));
+    }
+    let session = &*session;
     let (error_map, report) = (args.error_map.as_deref(), args.report.as_deref());
     let verify = |picture: &mut Picture, progress: &Done| session.verify(view, picture, progress);
     let verify: Option<&Verify> = if args.is_verified() { Some(&verify) } else { None };
     Files { input: &input.path, outputs, error_map, report }.write(&mut picture, verify)?;
+    bounds.map_or(Ok(()), say)?;
     if let Some(path) = &args.save_scene {
         save::save_scene(path, wanted, view, session.data().has_colors())?;
     }
@@ -141,7 +151,8 @@ pub(crate) fn summary(output: &Path, report: &Report) -> String {
     );
     let error = report.error.unwrap_or_default();
     if let Some(bound) = error.bound_max {
-        text += &format!("\nbound: no colour differs by more than {bound:.5} from full resolution");
+        let against = error.bound_against.unwrap_or_default();
+        text += &format!("\nbound: no colour differs by more than {bound:.5} from {against}");
     }
     if let Some(found) = error.measured {
         let rmse = found.measured_rmse;

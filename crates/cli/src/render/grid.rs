@@ -60,7 +60,7 @@ pub(super) fn run(
         let _busy = Progress::spinner("drawing");
         frames(run, &mut session, &view, backend)?
     };
-    files::finish(run, &view, picture, &session)
+    files::finish(run, &view, picture, &mut session)
 }
 
 /// Draws slices from a file.
@@ -83,7 +83,7 @@ pub(super) fn run_stack(run: &Run, mesh: &QuantizedMesh, backend: &mut dyn Backe
         let _busy = Progress::spinner("drawing");
         frames(run, &mut session, &view, backend)?
     };
-    files::finish(run, &view, picture, &session)
+    files::finish(run, &view, picture, &mut session)
 }
 
 /// Draws every time step by one view.

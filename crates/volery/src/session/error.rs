@@ -129,6 +129,14 @@ pub enum RenderError {
     /// Cells could not be sliced.
     #[error(transparent)]
     Stack(#[from] stack::Error),
+    /// Nobody knows how far a picture can be from the exact one.
+    #[error("bounds of pixels are known of raycast in full resolution and with a tolerance, found {technique}{}", if *.has_deadline { " with a deadline" } else { "" })]
+    NoBound {
+        /// What draws.
+        technique: &'static str,
+        /// Whether it is the deadline's fault.
+        has_deadline: bool,
+    },
     /// No frame was asked for.
     #[error("0 frames, expected at least 1")]
     NoFrame,

@@ -17,6 +17,7 @@ use volery_frame::{
 use volery_pyramid::Node;
 use volery_scene::Plane;
 
+use crate::matter_bound::MatterBound;
 use crate::residency::Store;
 use crate::session::{RenderError, VerifyError};
 use crate::view::{How, View, ViewOptions};
@@ -55,6 +56,15 @@ pub trait Technique<D>: Send {
     /// # Errors
     /// When there is nothing to choose from, or too much.
     fn plan(&mut self, data: &mut D, view: &View) -> Result<Plan, RenderError>;
+
+    /// How far each pixel of what a view draws can be from the exact picture; `None` where that is not known.
+    ///
+    /// # Errors
+    /// As [`Technique::plan`].
+    fn bound(&mut self, data: &mut D, view: &View) -> Result<Option<MatterBound>, RenderError> {
+        let _ = (data, view);
+        Ok(None)
+    }
 
     /// The exact picture, in `f64`. `progress` hears a number in [0, 1] now and then.
     ///

@@ -25,7 +25,8 @@ use volery_scene::TransferFunction;
 
 use crate::data::{Data, VolumeData};
 use crate::fit;
-use crate::residency::Numbers;
+use crate::matter_bound::{MatterBound, matter_bound};
+use crate::residency::{self, Numbers};
 use crate::session::{RenderError, VerifyError};
 use crate::technique::{Drawing, Kept, Plan, Technique, Work};
 use crate::transfer::Preset;
@@ -120,6 +121,18 @@ impl Technique<VolumeData> for Raycast {
             bound_max: None,
             geometry_seconds: None,
         })
+    }
+
+    fn bound(&mut self, volume: &mut VolumeData, view: &View) -> Result<Option<MatterBound>, RenderError> {
+        // What rays far apart leave out is not known.
+        if matches!(view.dial, Dial::Deadline(_)) {
+            return Ok(None);
+        }
+        let Plan { drawing, store, .. } = self.plan(volume, view)?;
+        let (Drawing::Rays { bricks, .. }, Some((store, nodes))) = (drawing, store) else { return Ok(None) };
+        let transfer = view.of_values()?;
+        let bound = matter_bound(view, transfer, (volume.source(), &store), (&nodes, &bricks));
+        Ok(Some(bound.map_err(residency::Error::from)?))
     }
 
     fn truth(

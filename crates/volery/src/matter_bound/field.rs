@@ -1,0 +1,266 @@
+//! The field that a cut shows, cell by cell, and how far it is from the exact one.
+//!
+//! Both fields are trilinear, on nested cells: in a drawn cell they differ most at a finest sample in it. So the difference
+//! is known exactly, with its sign, seams included, from the finest samples of the nodes that are drawn.
+
+use rayon::prelude::*;
+use volery_frame::{JoinedBrick, TexelType};
+use volery_pyramid::{Brick, BrickShape, Node as NodeName, NodeSource, ReadError};
+use volery_scene::TransferFunction;
+
+use crate::residency::Store;
+
+/// Values relative to the store's offset, as far from 0 as `f32` can be taken.
+const FARTHEST: f64 = 1e30;
+
+/// A drawn node.
+#[derive(Debug)]
+pub(super) struct Node {
+    pub(super) level: u32,
+    /// Finest cell at its lower corner.
+    pub(super) first_cell: [i64; 3],
+    /// Samples along x, y, z, x fastest; those at seams are what is drawn there.
+    count: [usize; 3],
+    samples: Vec<f32>,
+    /// Of each cell, x fastest, how far the exact field is from the drawn one: least and largest difference. None where
+    /// they are the same.
+    errors: Vec<[f32; 2]>,
+    /// Whether there is nothing to be seen in it, in the drawn field as in the exact one.
+    pub(super) is_clear: bool,
+}
+
+/// All drawn nodes.
+#[derive(Debug)]
+pub(super) struct Field {
+    /// Finest cells along x, y, z.
+    pub(super) cells: [i64; 3],
+    /// World size of a finest cell.
+    pub(super) spacing: [f64; 3],
+    /// Finest cells of a finest brick along an axis: 2 to this.
+    pub(super) log_brick: u32,
+    bricks: [usize; 3],
+    /// Of each finest brick, the node that shows it, and one more.
+    owners: Vec<u32>,
+    nodes: Vec<Node>,
+    /// How far texels may be from samples.
+    pub(super) rounding: f64,
+}
+
+/// A cell that a ray goes through.
+pub(super) struct Cell {
+    /// Values at its corners, x fastest.
+    pub(super) corners: [f64; 8],
+    /// Least and largest difference of the exact field from the drawn one in it, texels aside: not above 0, and not below.
+    pub(super) error: [f64; 2],
+}
+
+impl Field {
+    pub(super) fn new(
+        (source, store): (&dyn NodeSource, &Store),
+        (nodes, bricks): (&[NodeName], &[JoinedBrick]),
+        transfer: &TransferFunction,
+    ) -> Result<Self, ReadError> {
+        let layout = &store.layout;
+        let per_brick = i64::from(layout.brick_cells);
+        let cells = layout.cells.map(i64::from);
+        let num = cells.map(|cells| (cells.div_euclid(per_brick) + 1) as usize);
+        let mut owners = vec![0_u32; num.iter().product()];
+        for (owner, joined) in (1..).zip(bricks) {
+            let size = 1_i64 << joined.placed.level;
+            let range = |axis: usize| {
+                let first = i64::from(joined.placed.first_cell[axis]) / per_brick;
+                first as usize..((first + size) as usize).min(num[axis])
+            };
+            for (z, y) in range(2).flat_map(|z| range(1).map(move |y| (z, y))) {
+                let row = (z * num[1] + y) * num[0];
+                owners[row..][range(0)].fill(owner);
+            }
+        }
+        let node = |(&node, joined): (&NodeName, &JoinedBrick)| {
+            let stats = source.stats(node)[0];
+            let is_clear = joined.seams == 0 && transfer.is_transparent(stats.min, stats.max);
+            Node::read((source, store), (node, joined), is_clear)
+        };
+        let nodes = nodes.par_iter().zip(bricks).map(node).collect::<Result<Vec<_>, _>>()?;
+        let rounding = if layout.texel == TexelType::F32 {
+            let farthest = nodes.iter().flat_map(|node| &node.samples).filter(|x| x.is_finite());
+            let farthest = farthest.fold(0.0_f32, |most, x| most.max(x.abs()));
+            f64::from(farthest) * f64::from(f32::EPSILON)
+        } else {
+            0.0
+        };
+        let spacing = layout.spacing.to_array();
+        let log_brick = layout.brick_cells.ilog2();
+        Ok(Self { cells, spacing, log_brick, bricks: num, owners, nodes, rounding })
+    }
+
+    /// The node that shows a finest cell.
+    pub(super) fn node(&self, cell: [i64; 3]) -> Option<&Node> {
+        let [x, y, z] = cell.map(|cell| (cell >> self.log_brick) as usize);
+        let owner = self.owners[(z * self.bricks[1] + y) * self.bricks[0] + x];
+        (owner as usize).checked_sub(1).map(|place| &self.nodes[place])
+    }
+}
+
+/// The values of a node, relative to the store's offset; NaN where it is blank.
+fn values(
+    (source, store): (&dyn NodeSource, &Store),
+    node: NodeName,
+) -> Result<(Brick, Vec<f32>), ReadError> {
+    let mut brick = Brick::empty(source.sample_type());
+    source.read_brick(node, &mut brick)?;
+    let value = |place: usize| {
+        let value = brick.samples.value(place, 0);
+        let value = (value - store.layout.value_offset).clamp(-FARTHEST, FARTHEST);
+        if brick.samples.value(place, 0).is_finite() { value as f32 } else { f32::NAN }
+    };
+    let values = (0..brick.samples.len()).map(value).collect();
+    Ok((brick, values))
+}
+
+impl Node {
+    fn read(
+        store: (&dyn NodeSource, &Store),
+        (name, joined): (NodeName, &JoinedBrick),
+        is_clear: bool,
+    ) -> Result<Self, ReadError> {
+        let mut node = Self {
+            level: joined.placed.level,
+            first_cell: joined.placed.first_cell.map(i64::from),
+            count: [0; 3],
+            samples: Vec::new(),
+            errors: Vec::new(),
+            is_clear,
+        };
+        if is_clear {
+            return Ok(node);
+        }
+        let (brick, values) = values(store, name)?;
+        (node.count, node.samples) = (brick.shape.count, values);
+        join(&mut node.samples, &brick.shape, (joined.seams, store.1.layout.brick_cells as usize));
+        if node.level > 0 || joined.seams != 0 {
+            node.compare(store, name)?;
+        }
+        Ok(node)
+    }
+
+    /// Finds how far the exact field is from this node's.
+    fn compare(&mut self, store: (&dyn NodeSource, &Store), name: NodeName) -> Result<(), ReadError> {
+        let num_cells = self.count.map(|count| count.saturating_sub(1));
+        self.errors = vec![[0.0; 2]; num_cells.iter().product()];
+        let level = self.level;
+        let (layout, per_brick) = (store.0.layout(), i64::from(store.1.layout.brick_cells));
+        let finest = layout.nodes(0);
+        let range =
+            |axis: usize| name.index[axis] << level..((name.index[axis] + 1) << level).min(finest[axis]);
+        let all = range(2).flat_map(|z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z])));
+        for index in all {
+            let (brick, values) = values(store, NodeName { level: 0, index })?;
+            // From the node's first sample to the brick's, in finest cells.
+            let first: [i64; 3] =
+                std::array::from_fn(|axis| i64::from(index[axis]) * per_brick - self.first_cell[axis]);
+            let [nx, ny, nz] = brick.shape.count;
+            let places = (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
+            for (place, value) in places.zip(values) {
+                let place = std::array::from_fn(|axis| (first[axis] + place[axis] as i64) as usize);
+                self.take_sample(place, value, num_cells);
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts a finest sample, so many finest cells from the node's corner, in all cells that it is in or at.
+    fn take_sample(&mut self, place: [usize; 3], value: f32, num_cells: [usize; 3]) {
+        let size = 1_usize << self.level;
+        let cell: [usize; 3] =
+            std::array::from_fn(|axis| (place[axis] / size).min(num_cells[axis].saturating_sub(1)));
+        let share = |axis: usize| (place[axis] - cell[axis] * size) as f64 / size as f64;
+        let drawn = trilinear(&self.corners(cell), [share(0), share(1), share(2)]);
+        let difference = f64::from(value) - drawn;
+        let error = match (value.is_nan(), drawn.is_nan()) {
+            (true, true) => return,
+            (false, false) if difference == 0.0 => return,
+            (false, false) => {
+                [(difference.min(0.0) as f32).next_down(), (difference.max(0.0) as f32).next_up()]
+            }
+            // Matter beside none.
+            _ => [f32::NEG_INFINITY, f32::INFINITY],
+        };
+        let below = |axis: usize| usize::from(place[axis] == cell[axis] * size && cell[axis] > 0);
+        for z in cell[2] - below(2)..=cell[2] {
+            for y in cell[1] - below(1)..=cell[1] {
+                for x in cell[0] - below(0)..=cell[0] {
+                    let known = &mut self.errors[(z * num_cells[1] + y) * num_cells[0] + x];
+                    *known = [known[0].min(error[0]), known[1].max(error[1])];
+                }
+            }
+        }
+    }
+
+    /// The values at the corners of a cell.
+    fn corners(&self, [x, y, z]: [usize; 3]) -> [f64; 8] {
+        let [nx, ny, _] = self.count;
+        std::array::from_fn(|corner| {
+            let [i, j, k] = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];
+            self.samples.get((k * ny + j) * nx + i).map_or(f64::NAN, |&value| f64::from(value))
+        })
+    }
+
+    /// The cell of the node that holds a finest cell; none where there is no matter in it.
+    pub(super) fn cell(&self, finest: [i64; 3]) -> Option<Cell> {
+        let [x, y, z] =
+            std::array::from_fn(|axis| ((finest[axis] - self.first_cell[axis]) >> self.level) as usize);
+        let corners = self.corners([x, y, z]);
+        let place = (z * (self.count[1] - 1) + y) * (self.count[0] - 1) + x;
+        let error = self.errors.get(place).map_or([0.0; 2], |error| error.map(f64::from));
+        if corners.iter().any(|value| value.is_nan()) {
+            // Nothing is drawn; there may be anything.
+            return error[1].is_infinite().then_some(Cell { corners: [0.0; 8], error });
+        }
+        Some(Cell { corners, error })
+    }
+}
+
+/// A field between the corners of a cell.
+pub(super) fn trilinear(corners: &[f64; 8], [x, y, z]: [f64; 3]) -> f64 {
+    let mix = |a: f64, b: f64, share: f64| if share == 0.0 { a } else { (1.0 - share) * a + share * b };
+    let along = |first: usize| mix(corners[first], corners[first + 1], x);
+    mix(mix(along(0), along(2), y), mix(along(4), along(6), y), z)
+}
+
+/// Gives samples at seams the values of the coarser neighbour: see [`JoinedBrick::seams`].
+fn join(samples: &mut [f32], shape: &BrickShape, (seams, brick_cells): (u32, usize)) {
+    let own = samples.to_vec();
+    for bit in (0..27_u32).filter(|bit| seams >> bit & 1 == 1) {
+        let sides: [u32; 3] = std::array::from_fn(|axis| bit / 3_u32.pow(axis as u32) % 3);
+        // Corners are samples of all levels; a brick that the domain cuts off has no upper side there.
+        let is_there = |axis: usize| sides[axis] != 2 || shape.count[axis] == brick_cells + 1;
+        if !sides.contains(&1) || !(0..3).all(is_there) {
+            continue;
+        }
+        let range = |axis: usize| match sides[axis] {
+            0 => 0..1,
+            1 => 0..shape.count[axis],
+            _ => shape.count[axis] - 1..shape.count[axis],
+        };
+        for z in range(2) {
+            for y in range(1) {
+                for x in range(0) {
+                    let ends: [[usize; 2]; 3] = std::array::from_fn(|axis| {
+                        let place = [x, y, z][axis];
+                        let last = shape.count[axis] - 1;
+                        let is_between = sides[axis] == 1 && place % 2 == 1;
+                        if is_between { [place - 1, (place + 1).min(last)] } else { [place; 2] }
+                    });
+                    let mean: f64 = (0..8)
+                        .map(|corner| {
+                            let at = [0, 1, 2].map(|axis| ends[axis][corner >> axis & 1]);
+                            f64::from(own[shape.index(at)])
+                        })
+                        .sum();
+                    samples[shape.index([x, y, z])] = (mean / 8.0) as f32;
+                }
+            }
+        }
+    }
+}
