@@ -102,6 +102,9 @@ pub(crate) struct RenderArgs {
     /// Largest difference of a value from the full resolution, as a fraction of the file's value range
     #[arg(long, value_name = "T", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
+    /// Largest difference of any colour channel that coarse data may make, in [0, 1]; of raycast and plane
+    #[arg(long, value_name = "E", value_parser = parse_error, allow_negative_numbers = true)]
+    pub(crate) error: Option<f64>,
     /// Draw the best picture that so many milliseconds allow (techniques raycast, plane, stack)
     #[arg(long, value_name = "B", value_parser = parse_budget, allow_negative_numbers = true)]
     pub(crate) budget_ms: Option<f64>,
@@ -168,9 +171,6 @@ pub(crate) struct PlaneArgs {
     #[arg(long, value_name = "Q", requires = "focus", default_value_t = 1.0, value_parser = parse_quality,
         allow_negative_numbers = true)]
     pub(crate) quality: f64,
-    /// Largest difference of any colour channel from the full resolution, in [0, 1]
-    #[arg(long, value_name = "E", value_parser = parse_error, allow_negative_numbers = true)]
-    pub(crate) error: Option<f64>,
     /// Let light through where the transfer function's opacity is below 1
     #[arg(long)]
     pub(crate) transparent: bool,

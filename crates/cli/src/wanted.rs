@@ -75,7 +75,6 @@ pub(crate) fn given(wanted: &SceneFile, is_of_scene: bool) -> Vec<Given> {
     let options = [
         ("--plane", !wanted.planes.is_empty(), Plane),
         ("--focus", wanted.focus.is_some(), Plane),
-        ("--error", wanted.error.is_some(), Plane),
         ("--transparent", wanted.transparent, Plane),
         ("--nearest", wanted.nearest, Plane),
         ("--show-nodes", wanted.show_nodes, Plane),
@@ -148,7 +147,7 @@ pub(crate) fn over(args: &RenderArgs, scene: Option<&SceneFile>, input: SceneInp
         gaze: args.gaze.or(scene.gaze),
         planes: if own_planes.is_empty() { scene.planes } else { own_planes },
         focus: focus.or(scene.focus),
-        error: planes.error.or(scene.error),
+        error: args.error.or(scene.error),
         transparent: planes.transparent || scene.transparent,
         nearest: planes.nearest || scene.nearest,
         show_nodes: planes.show_nodes || scene.show_nodes,

@@ -83,7 +83,7 @@ pub struct SceneFile {
     /// Where planes are in full detail.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::focus")]
     pub focus: Option<SceneFocus>,
-    /// Largest difference of a colour from the full resolution, in [0, 1]; of planes.
+    /// Largest difference of a colour that coarse data may make, in [0, 1]; of rays and planes.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::error")]
     pub error: Option<f64>,
     /// Whether planes let light through where the transfer function's opacity is below 1.

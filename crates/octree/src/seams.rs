@@ -53,6 +53,12 @@ impl Joined {
         let seams = seams(layout, &cut);
         Self { cut, seams }
     }
+
+    /// With the children of some of its nodes in their place; all nodes stay as they are where none is too coarse.
+    #[must_use]
+    pub fn split(&self, layout: &Layout, too_coarse: &[bool], filter: &mut impl Filter) -> Self {
+        Self::of(layout, &split(layout, &self.cut, too_coarse, filter), filter)
+    }
 }
 
 /// For each drawn node of `cut` its seams: the faces and edges that a coarser drawn node touches, each by the direction

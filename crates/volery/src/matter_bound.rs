@@ -37,6 +37,8 @@ mod ray;
 #[cfg(test)]
 mod tests;
 
+use std::sync::atomic::AtomicBool;
+
 use rayon::prelude::*;
 use volery_frame::JoinedBrick;
 use volery_pyramid::{Node, NodeSource, ReadError};
@@ -45,7 +47,7 @@ use volery_scene::TransferFunction;
 use crate::residency::Store;
 use crate::view::View;
 use colors::Colors;
-use field::Field;
+use field::{Field, Known};
 use ray::Walker;
 
 /// Of each pixel, how far red, green and blue can be from the exact picture.
@@ -72,25 +74,78 @@ impl MatterBound {
     }
 }
 
-/// The bound of a picture of these nodes, whose bricks are drawn so.
-pub(crate) fn matter_bound(
-    view: &View,
-    transfer: &TransferFunction,
-    (source, store): (&dyn NodeSource, &Store),
-    (nodes, bricks): (&[Node], &[JoinedBrick]),
-) -> Result<MatterBound, ReadError> {
-    let View { width, height, .. } = *view;
-    let colors = Colors::new(transfer, store.layout.value_offset);
-    let field = Field::new((source, store), (nodes, bricks), transfer)?;
-    let grid = view.camera.rays(width, height);
-    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
-    pixels.par_chunks_mut(width as usize).zip(0..height).for_each_init(
-        || Walker::new(&field, &colors, view),
-        |walker, (row, y)| {
-            for (pixel, x) in row.iter_mut().zip(0..width) {
-                *pixel = walker.bound(&grid.pixel(x, y));
-            }
-        },
-    );
-    Ok(MatterBound { width, height, pixels })
+/// What is bounded: nodes, and their bricks as they are drawn.
+pub(crate) struct Drawn<'a> {
+    pub(crate) view: &'a View,
+    pub(crate) transfer: &'a TransferFunction,
+    pub(crate) source: &'a dyn NodeSource,
+    pub(crate) store: &'a Store,
+}
+
+impl Drawn<'_> {
+    /// The bound of a picture of these nodes, whose bricks are drawn so.
+    pub(crate) fn bound(&self, nodes: &[Node], bricks: &[JoinedBrick]) -> Result<MatterBound, ReadError> {
+        Search::new(self).bound(nodes, bricks)
+    }
+}
+
+/// Bounds of one view with several cuts.
+pub(crate) struct Search<'a> {
+    drawn: &'a Drawn<'a>,
+    colors: Colors,
+    known: Known,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(drawn: &'a Drawn<'a>) -> Self {
+        let colors = Colors::new(drawn.transfer, drawn.store.layout.value_offset);
+        Self { drawn, colors, known: Known::new() }
+    }
+
+    fn field(&mut self, nodes: &[Node], bricks: &[JoinedBrick]) -> Result<Field, ReadError> {
+        let Drawn { transfer, source, store, .. } = *self.drawn;
+        Field::new((source, store), (nodes, bricks), transfer, &mut self.known)
+    }
+
+    pub(crate) fn bound(&mut self, nodes: &[Node], bricks: &[JoinedBrick]) -> Result<MatterBound, ReadError> {
+        let field = self.field(nodes, bricks)?;
+        let (view, colors) = (self.drawn.view, &self.colors);
+        let View { width, height, .. } = *view;
+        let grid = view.camera.rays(width, height);
+        let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+        pixels.par_chunks_mut(width as usize).zip(0..height).for_each_init(
+            || Walker::new(&field, colors, view),
+            |walker, (row, y)| {
+                for (pixel, x) in row.iter_mut().zip(0..width) {
+                    *pixel = walker.bound(&grid.pixel(x, y));
+                }
+            },
+        );
+        Ok(MatterBound { width, height, pixels })
+    }
+
+    /// Which nodes are too coarse for some pixels, one of so many along both axes, to differ by less than `share` of what
+    /// they may differ by at most; and that.
+    pub(crate) fn too_coarse(
+        &mut self,
+        (nodes, bricks): (&[Node], &[JoinedBrick]),
+        (step, share): (u32, f64),
+    ) -> Result<(Vec<bool>, f64), ReadError> {
+        let field = self.field(nodes, bricks)?;
+        let (view, colors) = (self.drawn.view, &self.colors);
+        let grid = view.camera.rays(view.width, view.height);
+        let too_coarse: Vec<AtomicBool> = nodes.iter().map(|_| AtomicBool::new(false)).collect();
+        let walk = |most: f64| {
+            let row = |walker: &mut Walker<'_>, y: u32| {
+                let columns = (step / 2..view.width).step_by(step as usize);
+                columns.map(|x| walker.mark(&grid.pixel(x, y), most, &too_coarse)).fold(0.0, f64::max)
+            };
+            let rows: Vec<u32> = (step / 2..view.height).step_by(step as usize).collect();
+            let each = rows.into_par_iter().map_init(|| Walker::new(&field, colors, view), |walker, y| row(walker, y));
+            each.reduce(|| 0.0, f64::max)
+        };
+        let most = walk(f64::INFINITY);
+        walk(share * most);
+        Ok((too_coarse.into_iter().map(AtomicBool::into_inner).collect(), most))
+    }
 }

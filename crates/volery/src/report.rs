@@ -241,8 +241,9 @@ pub struct Dial {
 /// Distance from the truth, of colour channels in [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Error {
-    /// No channel of any pixel differs by more from the picture of the full resolution; computed without it. What
-    /// separates that picture from the truth (rounding to texels, and of `f32`) comes on top.
+    /// No channel of any pixel differs by more, because data are coarse; computed without the truth. Of planes that is
+    /// against the picture of the full resolution: what separates that from the truth (rounding to texels, and of `f32`)
+    /// comes on top. Of rays it is against the exact picture, and `budget` comes on top.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound_max: Option<f64>,
     /// The root mean square over all pixels of what they may differ by: no rmse is above it.
@@ -290,6 +291,9 @@ pub(crate) fn transfer_of(view: &View) -> SceneTransfer {
         Transfer::Values(transfer) => SceneTransfer::Values(transfer.clone()),
     }
 }
+
+/// What bounds of rays are against.
+pub(crate) const AGAINST_EXACT: &str = "the exact picture, but for what `budget` says";
 
 /// The version of this library.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -194,7 +194,7 @@ impl<D: Data> Session<D> {
         let error = picture.report.error.get_or_insert_default();
         error.bound_max = Some(bound.max());
         error.bound_rms = Some(bound.rms());
-        error.bound_against = Some("the exact picture, what `budget` says on top");
+        error.bound_against = Some(report::AGAINST_EXACT);
         Ok(bound)
     }
 
@@ -292,20 +292,16 @@ fn picture_view(view: &View) -> PictureView<'_> {
 
 /// What is known of the error without the truth.
 fn error_of(plan: &Plan, drawn: &Drawn) -> Option<report::Error> {
-    let none = report::Error::default();
-    if let Some(bound) = plan.bound_max {
-        return Some(report::Error {
-            bound_max: Some(bound),
-            bound_against: Some("full resolution"),
-            ..none
-        });
-    }
-    match (&plan.drawing, &plan.store, drawn.ray_doubt) {
+    let budget = match (&plan.drawing, &plan.store, drawn.ray_doubt) {
         (Drawing::Rays { transfer, .. }, Some((store, _)), Some(doubt)) => {
-            Some(report::Error { budget: Some(RayBudget::new(transfer, &store.layout, doubt)), ..none })
+            Some(RayBudget::new(transfer, &store.layout, doubt))
         }
         _ => None,
-    }
+    };
+    let against = if budget.is_some() { report::AGAINST_EXACT } else { "full resolution" };
+    let bound_against = plan.bound_max.map(|_| against);
+    let error = report::Error { bound_max: plan.bound_max, bound_against, budget, ..report::Error::default() };
+    (error != report::Error::default()).then_some(error)
 }
 
 impl Picture {

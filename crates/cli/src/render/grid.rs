@@ -26,7 +26,8 @@ fn of_volumes(run: &Run) -> Option<String> {
     let given = wanted::given(wanted, false);
     let given = given.into_iter().find(|option| other(&option.technique)).map(|option| option.to_string());
     let tolerance = wanted.tolerance.map(|_| "--tolerance".to_owned());
-    technique.or(given).or(tolerance).or(args.unread_by_stack().map(str::to_owned))
+    let error = wanted.error.map(|_| "--error".to_owned());
+    technique.or(given).or(tolerance).or(error).or(args.unread_by_stack().map(str::to_owned))
 }
 
 pub(super) fn run(

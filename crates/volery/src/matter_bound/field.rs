@@ -3,6 +3,9 @@
 //! Both fields are trilinear, on nested cells: in a drawn cell they differ most at a finest sample in it. So the difference
 //! is known exactly, with its sign, seams included, from the finest samples of the nodes that are drawn.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use volery_frame::{JoinedBrick, TexelType};
 use volery_pyramid::{Brick, BrickShape, Node as NodeName, NodeSource, ReadError};
@@ -22,12 +25,16 @@ pub(super) struct Node {
     /// Samples along x, y, z, x fastest; those at seams are what is drawn there.
     count: [usize; 3],
     samples: Vec<f32>,
+    seams: u32,
     /// Of each cell, x fastest, how far the exact field is from the drawn one: least and largest difference. None where
     /// they are the same.
     errors: Vec<[f32; 2]>,
     /// Whether there is nothing to be seen in it, in the drawn field as in the exact one.
     pub(super) is_clear: bool,
 }
+
+/// Nodes that were read, by name and seams: most serve again when a cut changes in part.
+pub(super) type Known = HashMap<(NodeName, u32), Arc<Node>>;
 
 /// All drawn nodes.
 #[derive(Debug)]
@@ -41,7 +48,7 @@ pub(super) struct Field {
     bricks: [usize; 3],
     /// Of each finest brick, the node that shows it, and one more.
     owners: Vec<u32>,
-    nodes: Vec<Node>,
+    nodes: Vec<Arc<Node>>,
     /// How far texels may be from samples.
     pub(super) rounding: f64,
 }
@@ -57,8 +64,9 @@ pub(super) struct Cell {
 impl Field {
     pub(super) fn new(
         (source, store): (&dyn NodeSource, &Store),
-        (nodes, bricks): (&[NodeName], &[JoinedBrick]),
+        (names, bricks): (&[NodeName], &[JoinedBrick]),
         transfer: &TransferFunction,
+        known: &mut Known,
     ) -> Result<Self, ReadError> {
         let layout = &store.layout;
         let per_brick = i64::from(layout.brick_cells);
@@ -77,11 +85,17 @@ impl Field {
             }
         }
         let node = |(&node, joined): (&NodeName, &JoinedBrick)| {
+            if let Some(known) = known.get(&(node, joined.seams)) {
+                return Ok(known.clone());
+            }
             let stats = source.stats(node)[0];
             let is_clear = joined.seams == 0 && transfer.is_transparent(stats.min, stats.max);
-            Node::read((source, store), (node, joined), is_clear)
+            Node::read((source, store), (node, joined), is_clear).map(Arc::new)
         };
-        let nodes = nodes.par_iter().zip(bricks).map(node).collect::<Result<Vec<_>, _>>()?;
+        let read = names.par_iter().zip(bricks).map(node).collect::<Result<Vec<_>, ReadError>>()?;
+        let keys = names.iter().zip(bricks).map(|(&name, brick)| (name, brick.seams));
+        *known = keys.zip(read.iter().cloned()).collect();
+        let nodes = read;
         let rounding = if layout.texel == TexelType::F32 {
             let farthest = nodes.iter().flat_map(|node| &node.samples).filter(|x| x.is_finite());
             let farthest = farthest.fold(0.0_f32, |most, x| most.max(x.abs()));
@@ -96,9 +110,39 @@ impl Field {
 
     /// The node that shows a finest cell.
     pub(super) fn node(&self, cell: [i64; 3]) -> Option<&Node> {
+        self.place(cell).map(|place| &*self.nodes[place])
+    }
+
+    /// The place among all of the node that shows a finest cell.
+    pub(super) fn place(&self, cell: [i64; 3]) -> Option<usize> {
         let [x, y, z] = cell.map(|cell| (cell >> self.log_brick) as usize);
         let owner = self.owners[(z * self.bricks[1] + y) * self.bricks[0] + x];
-        (owner as usize).checked_sub(1).map(|place| &self.nodes[place])
+        (owner as usize).checked_sub(1)
+    }
+
+    /// Calls with the places of the nodes that make the field of a node coarse: itself, and those that it joins.
+    pub(super) fn each_cause(&self, place: usize, mut visit: impl FnMut(usize)) {
+        let node = &self.nodes[place];
+        if node.level > 0 {
+            visit(place);
+        }
+        if node.seams == 0 {
+            return;
+        }
+        let per_brick = 1_i64 << self.log_brick;
+        let size = per_brick << node.level;
+        // A finest cell just beyond each face and edge.
+        for bit in (0..27_u32).filter(|bit| node.seams >> bit & 1 == 1) {
+            let cell: [i64; 3] = std::array::from_fn(|axis| {
+                let first = node.first_cell[axis];
+                [first - 1, first, first + size][(bit / 3_u32.pow(axis as u32) % 3) as usize]
+            });
+            let is_inside = (0..3).all(|axis| (0..self.cells[axis]).contains(&cell[axis]));
+            let beside = is_inside.then(|| self.place(cell)).flatten();
+            if let Some(beside) = beside.filter(|&beside| self.nodes[beside].level > node.level) {
+                visit(beside);
+            }
+        }
     }
 }
 
@@ -129,6 +173,7 @@ impl Node {
             first_cell: joined.placed.first_cell.map(i64::from),
             count: [0; 3],
             samples: Vec::new(),
+            seams: joined.seams,
             errors: Vec::new(),
             is_clear,
         };

@@ -1,5 +1,7 @@
 //! One ray through the field: its pieces, what lies behind each, and what they add up to.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use volery_scene::Ray;
 
 use super::colors::{Colors, Run, Seen};
@@ -18,6 +20,8 @@ const ROUNDING: f64 = 1e-9;
 /// A piece of a ray.
 struct Piece {
     length: f64,
+    /// The place of its node among all.
+    place: u32,
     /// What the drawn field shows.
     drawn: Seen,
     /// Least extinction of the exact one.
@@ -36,6 +40,8 @@ pub(super) struct Walker<'a> {
     /// The largest difference of two colours that can be seen, by channel.
     widths: [f64; 3],
     pieces: Vec<Piece>,
+    /// What each node may change in a channel, by its place.
+    changes: Vec<(u32, f64)>,
     /// What is left of the light behind the pieces, at most.
     clear: f64,
 }
@@ -48,7 +54,7 @@ impl<'a> Walker<'a> {
             let [[a, b], [c, d]] = [background[channel], colors.seen[channel]];
             b.max(d) - a.min(c)
         });
-        Self { field, colors, background, widths, pieces: Vec::new(), clear: 1.0 }
+        Self { field, colors, background, widths, pieces: Vec::new(), changes: Vec::new(), clear: 1.0 }
     }
 
     /// How far a ray's channels can be from the exact ones.
@@ -62,6 +68,25 @@ impl<'a> Walker<'a> {
                 if bound > 0.0 { bound.next_up() } else { 0.0 }
             },
         )
+    }
+
+    /// The bound of a ray, and marks the nodes that make it larger than `most`: those that change most, until what is left
+    /// of the others' changes is not above it.
+    pub(super) fn mark(&mut self, ray: &Ray, most: f64, too_coarse: &[AtomicBool]) -> f64 {
+        let bound = self.bound(ray).into_iter().fold(0.0, f32::max);
+        if f64::from(bound) > most {
+            let field = self.field;
+            self.changes.sort_by(|(a, x), (b, y)| y.total_cmp(x).then(a.cmp(b)));
+            let mut left: f64 = self.changes.iter().map(|(_, change)| change).sum();
+            for &(place, change) in self.changes.iter().filter(|(_, change)| *change > 0.0) {
+                if left <= most {
+                    break;
+                }
+                left -= change;
+                field.each_cause(place as usize, |cause| too_coarse[cause].store(true, Ordering::Relaxed));
+            }
+        }
+        f64::from(bound)
     }
 
     /// Finds the pieces of a ray, front to back.
@@ -137,6 +162,7 @@ impl<'a> Walker<'a> {
     /// Adds the pieces of a cell, from one place in it to another.
     fn add(&mut self, node: &Node, finest: [i64; 3], [from, to]: [[f64; 3]; 2], length: f64) {
         let Some(cell) = node.cell(finest) else { return };
+        let place = self.field.place(finest).unwrap_or(0) as u32;
         let rounding = self.field.rounding;
         let error = [cell.error[0] - rounding, cell.error[1] + rounding];
         let all = cell.corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| {
@@ -157,11 +183,11 @@ impl<'a> Walker<'a> {
             // What is drawn may be rounded otherwise than here.
             let margin = rounding + 1e-12 * (all[1] - all[0]);
             let values = [range[0] - margin, range[1] + margin];
-            self.add_piece(length / num as f64, values, error);
+            self.add_piece(place, length / num as f64, values, error);
         }
     }
 
-    fn add_piece(&mut self, length: f64, [low, high]: [f64; 2], error: [f64; 2]) {
+    fn add_piece(&mut self, place: u32, length: f64, [low, high]: [f64; 2], error: [f64; 2]) {
         let drawn = self.colors.seen(self.colors.run(low, high));
         let (mut change, mut seen) = (None, drawn);
         if error != [0.0; 2] {
@@ -174,7 +200,7 @@ impl<'a> Walker<'a> {
             return;
         }
         self.clear *= (-extinction * length).exp();
-        self.pieces.push(Piece { length, drawn, extinction, change, behind: [[0.0; 2]; 3] });
+        self.pieces.push(Piece { length, place, drawn, extinction, change, behind: [[0.0; 2]; 3] });
     }
 
     /// Finds what colour lies behind each piece, from the last to the first.
@@ -206,7 +232,8 @@ impl<'a> Walker<'a> {
     }
 
     /// Adds up what the pieces may change, from the front.
-    fn sum(&self) -> [f64; 3] {
+    fn sum(&mut self) -> [f64; 3] {
+        self.changes.clear();
         let mut clear = 1.0;
         let mut sums = [0.0; 3];
         let mut least = self.widths;
@@ -215,11 +242,18 @@ impl<'a> Walker<'a> {
             if let Some((run, error)) = piece.change {
                 // ∫ T dt
                 let way = if piece.extinction > 0.0 { opacity / piece.extinction } else { piece.length };
+                let mut most: f64 = 0.0;
                 for (channel, sum) in sums.iter_mut().enumerate() {
                     let change = self.colors.change(run, channel, piece.behind[channel], error);
                     if change > 0.0 {
-                        *sum += clear * way.min(piece.length) * change;
+                        let change = clear * way.min(piece.length) * change;
+                        *sum += change;
+                        most = most.max(change.min(clear * self.widths[channel]));
                     }
+                }
+                match self.changes.last_mut() {
+                    Some((place, sum)) if *place == piece.place => *sum += most,
+                    _ => self.changes.push((piece.place, most)),
                 }
             }
             clear *= 1.0 - opacity;

@@ -169,9 +169,10 @@ fn pictures(scene: &Scene) -> Option<(MatterBound, [Image; 2])> {
         dial: Dial::Full,
         how: How::Raycast,
     };
-    let source = (&pyramid as &dyn NodeSource, &store);
-    let bound = matter_bound(&view, transfer, source, (&cut.nodes, &bricks)).expect("in memory");
-    let field = Field::new(source, (&cut.nodes, &bricks), transfer).expect("in memory");
+    let source: &dyn NodeSource = &pyramid;
+    let drawn_cut = Drawn { view: &view, transfer, source, store: &store };
+    let bound = drawn_cut.bound(&cut.nodes, &bricks).expect("in memory");
+    let field = Field::new((source, &store), (&cut.nodes, &bricks), transfer, &mut Known::new()).expect("in memory");
     // Cells of nodes without anything to be seen are not kept.
     if field.node([0; 3]).is_none() || bricks.iter().any(|brick| is_clear(&field, brick)) {
         return None;

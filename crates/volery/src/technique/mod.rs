@@ -191,15 +191,17 @@ impl<K, V> Default for Kept<K, V> {
 }
 
 impl<K: Clone + PartialEq, V> Kept<K, V> {
+    /// What was made of the same key.
+    pub(crate) fn found(&self, key: &K) -> Option<Arc<V>> {
+        self.0.as_ref().filter(|(made_of, _)| made_of == key).map(|(_, kept)| kept.clone())
+    }
+
     /// What was made of the same key, or else is made now.
     pub(crate) fn get(&mut self, key: &K, make: impl FnOnce() -> V) -> Arc<V> {
-        match &self.0 {
-            Some((made_of, kept)) if made_of == key => kept.clone(),
-            _ => {
-                let made = Arc::new(make());
-                self.0 = Some((key.clone(), made.clone()));
-                made
-            }
-        }
+        self.found(key).unwrap_or_else(|| {
+            let made = Arc::new(make());
+            self.0 = Some((key.clone(), made.clone()));
+            made
+        })
     }
 }

@@ -13,20 +13,29 @@
 //!   units; but for rounding of texels), and blank matter is where it was.
 //!
 //! - Where levels meet, the field is continuous.
+//!
+//! # With a largest error of the picture
+//! From the coarsest cut on, the pixels of a [bound](crate::matter_bound) say which nodes change them most; those are
+//! split, until no pixel can be off by more than was asked for. A round brings the largest bound down to a share, whatever
+//! was asked for, and asks one pixel of sixteen as long as these are not good enough: so a smaller error has the cut
+//! of a larger one, refined. What is hidden, outside or of the colour of what is behind it stays coarse.
+
+use std::collections::HashSet;
+use std::sync::Arc;
 
 use volery_frame::{JoinedBrick, RayTransfer, Revision};
 use volery_octree::{
     Answer, Cut, DataTolerance, Filter, Frustum, Joined, Transparency, Viewpoint, front_to_back, joined,
     select,
 };
-use volery_pyramid::Node;
+use volery_pyramid::{Layout, Node, NodeSource};
 use volery_reference::Tracer;
 use volery_scene::TransferFunction;
 
 use crate::data::{Data, VolumeData};
 use crate::fit;
-use crate::matter_bound::{MatterBound, matter_bound};
-use crate::residency::{self, Numbers};
+use crate::matter_bound::{Drawn, MatterBound, Search};
+use crate::residency::{self, Numbers, Store};
 use crate::session::{RenderError, VerifyError};
 use crate::technique::{Drawing, Kept, Plan, Technique, Work};
 use crate::transfer::Preset;
@@ -37,7 +46,15 @@ use crate::view::{Dial, How, View, ViewOptions};
 pub(crate) struct Raycast {
     table: Kept<(TransferFunction, Revision), RayTransfer>,
     cuts: Cuts,
+    /// Of the last view with an error.
+    certified: Kept<(View, Revision), (Arc<Joined>, f64)>,
 }
+
+/// Pixels along an axis of which one says what is too coarse.
+const PIXEL_STEP: u32 = 4;
+
+/// What a round leaves of the largest bound.
+const ROUND: f64 = 0.6;
 
 /// The last cuts of some tolerances, whatever is in view.
 #[derive(Debug, Default)]
@@ -67,9 +84,13 @@ impl Technique<VolumeData> for Raycast {
     }
 
     fn check(&self, volume: &VolumeData, view: &View) -> Result<(), RenderError> {
-        view.obeyed(|dial| matches!(dial, Dial::Full | Dial::Tolerance(_) | Dial::Deadline(_)))?;
+        view.obeyed(|_| true)?;
         view.of_values()?;
         volume.check_matter(&view.how)
+    }
+
+    fn forget_view(&mut self) {
+        self.certified = Kept::default();
     }
 
     fn coarser(&self, view: &View, rung: usize) -> Option<View> {
@@ -87,38 +108,27 @@ impl Technique<VolumeData> for Raycast {
             if is_rounded { table.of_rounded_texels() } else { table }
         });
         let nodes = source.layout();
-        let tolerance = volume.tolerance(view.dial).unwrap_or(0.0);
-        let seen = self.cuts.of(tolerance).get(&(transfer.clone(), layout.revision), || {
-            let transparency = Transparency { source, transfer };
-            if tolerance > 0.0 {
-                let error =
-                    |node: Node| source.stats(node).iter().map(|stats| stats.error).fold(0.0, f64::max);
-                joined(nodes, transparency, error, tolerance)
-            } else {
-                // Coarse nodes, if there are any, show the finest field: nothing jumps.
-                let cut = select(nodes, (transparency, DataTolerance { source, tolerance }));
-                Joined { seams: vec![0; cut.nodes.len()], cut }
+        let (seen, bound_max) = match view.dial {
+            Dial::Error(error) if error > 0.0 => {
+                let (seen, bound) = self.certified(volume, (view, transfer), &store, error)?;
+                (seen, Some(bound))
             }
-        });
-        let mut frustum = Frustum::new(nodes, &view.camera, view.width, view.height);
-        let mut is_seen = |node: Node| frustum.answer(node) != Answer::Skip;
-        let places: Vec<usize> =
-            (0..seen.cut.nodes.len()).filter(|&place| is_seen(seen.cut.nodes[place])).collect();
-        let in_view: Vec<Node> = places.iter().map(|&place| seen.cut.nodes[place]).collect();
-        let order = front_to_back(nodes, &in_view, Viewpoint::of(&view.camera, nodes));
-        let numbers = Numbers::of(nodes);
-        let brick = |&place: &usize| JoinedBrick {
-            placed: numbers.place(nodes, in_view[place]),
-            seams: seen.seams[places[place]],
+            _ => {
+                let tolerance = volume.tolerance(view.dial).unwrap_or(0.0);
+                let cut = self.cuts.of(tolerance);
+                (cut.get(&(transfer.clone(), layout.revision), || tolerant(source, transfer, tolerance)), None)
+            }
         };
-        let bricks = order.iter().map(brick).collect();
+        let (in_view, bricks) = in_view(nodes, view, &seen);
+        let order = front_to_back(nodes, &in_view, Viewpoint::of(&view.camera, nodes));
+        let bricks = order.iter().map(|&place| bricks[place]).collect();
         let ordered = order.iter().map(|&place| in_view[place]).collect();
         let in_view = Cut { nodes: in_view, skipped: Vec::new() };
         Ok(Plan {
             drawing: Drawing::Rays { transfer: table, bricks },
             work: Work { nodes_by_level: Some(in_view.nodes_by_level()), ..Work::default() },
             store: Some((store, ordered)),
-            bound_max: None,
+            bound_max,
             geometry_seconds: None,
         })
     }
@@ -131,8 +141,8 @@ impl Technique<VolumeData> for Raycast {
         let Plan { drawing, store, .. } = self.plan(volume, view)?;
         let (Drawing::Rays { bricks, .. }, Some((store, nodes))) = (drawing, store) else { return Ok(None) };
         let transfer = view.of_values()?;
-        let bound = matter_bound(view, transfer, (volume.source(), &store), (&nodes, &bricks));
-        Ok(Some(bound.map_err(residency::Error::from)?))
+        let drawn = Drawn { view, transfer, source: volume.source(), store: &store };
+        Ok(Some(drawn.bound(&nodes, &bricks).map_err(residency::Error::from)?))
     }
 
     fn truth(
@@ -143,6 +153,67 @@ impl Technique<VolumeData> for Raycast {
     ) -> Result<volery_reference::Image, VerifyError> {
         matter_truth(volume, view, progress)
     }
+}
+
+impl Raycast {
+    /// The cut of which no pixel is off by more than an error, and the largest that any is.
+    fn certified(
+        &mut self,
+        volume: &VolumeData,
+        (view, transfer): (&View, &TransferFunction),
+        store: &Store,
+        error: f64,
+    ) -> Result<(Arc<Joined>, f64), RenderError> {
+        let key = (view.clone(), store.layout.revision);
+        if let Some(kept) = self.certified.found(&key) {
+            return Ok((*kept).clone());
+        }
+        let source = volume.source();
+        let layout = source.layout();
+        let drawn = Drawn { view, transfer, source, store };
+        let mut search = Search::new(&drawn);
+        let mut joined = tolerant(source, transfer, f64::INFINITY);
+        let found = loop {
+            let (nodes, bricks) = in_view(layout, view, &joined);
+            let mut too_coarse = |step| search.too_coarse((&nodes, &bricks), (step, ROUND));
+            let (mut marked, most) = too_coarse(PIXEL_STEP).map_err(residency::Error::from)?;
+            if !marked.contains(&true) {
+                (marked, _) = too_coarse(1).map_err(residency::Error::from)?;
+            }
+            if most <= error || !marked.contains(&true) {
+                let bound = search.bound(&nodes, &bricks).map_err(residency::Error::from)?.max();
+                if bound <= error || !marked.contains(&true) {
+                    break (Arc::new(joined), bound);
+                }
+            }
+            let marked: HashSet<Node> =
+                nodes.iter().zip(&marked).filter(|(_, marked)| **marked).map(|(&node, _)| node).collect();
+            let marked: Vec<bool> = joined.cut.nodes.iter().map(|node| marked.contains(node)).collect();
+            joined = joined.split(layout, &marked, &mut Transparency { source, transfer });
+        };
+        Ok((*self.certified.get(&key, || found)).clone())
+    }
+}
+
+/// The cut that keeps a tolerance, in data units.
+fn tolerant(source: &dyn NodeSource, transfer: &TransferFunction, tolerance: f64) -> Joined {
+    let (layout, transparency) = (source.layout(), Transparency { source, transfer });
+    if tolerance > 0.0 {
+        let error = |node: Node| source.stats(node).iter().map(|stats| stats.error).fold(0.0, f64::max);
+        return joined(layout, transparency, error, tolerance);
+    }
+    // Coarse nodes, if there are any, show the finest field: nothing jumps.
+    let cut = select(layout, (transparency, DataTolerance { source, tolerance }));
+    Joined { seams: vec![0; cut.nodes.len()], cut }
+}
+
+/// The nodes of a cut that are not outside a view, and their bricks.
+fn in_view(layout: &Layout, view: &View, joined: &Joined) -> (Vec<Node>, Vec<JoinedBrick>) {
+    let mut frustum = Frustum::new(layout, &view.camera, view.width, view.height);
+    let numbers = Numbers::of(layout);
+    let drawn = joined.cut.nodes.iter().zip(&joined.seams);
+    let seen = drawn.filter(|&(&node, _)| frustum.answer(node) != Answer::Skip);
+    seen.map(|(&node, &seams)| (node, JoinedBrick { placed: numbers.place(layout, node), seams })).unzip()
 }
 
 /// Tolerances of coarser levels of detail, the last of which is the root.
