@@ -24,20 +24,19 @@
 //! infinite.
 //!
 //! # What it is against
-//! The exact picture of the samples, and the exact picture of the drawn field: rounding to texels is in `e`. How far the
-//! executors are from the exact picture of the drawn field is the [error budget of rays](crate::report::RayBudget), on top.
+//! The exact picture of the drawn field against that of all texels. How far executors are from the exact picture of what
+//! they are given, and what rounding to texels does, is the error budget of rays ([`crate::report`]), on top.
 //!
 //! # Limits
 //! Arithmetic is f64, not directed: sums are widened by a billionth. With meshes the colour behind is any. Full of
-//! opaque matter, one ray costs as many pieces as it meets cells: some ten times what drawing takes.
+//! matter, one ray costs as many pieces as it meets cells: some thirty times what drawing takes. Before opaque matter
+//! (opacity 1 in a control point) that is coarse a pixel may be anything that light left there can make of it.
 
 mod colors;
 mod field;
 mod ray;
 #[cfg(test)]
 mod tests;
-
-use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 use volery_frame::JoinedBrick;
@@ -134,18 +133,32 @@ impl<'a> Search<'a> {
         let field = self.field(nodes, bricks)?;
         let (view, colors) = (self.drawn.view, &self.colors);
         let grid = view.camera.rays(view.width, view.height);
-        let too_coarse: Vec<AtomicBool> = nodes.iter().map(|_| AtomicBool::new(false)).collect();
-        let walk = |most: f64| {
-            let row = |walker: &mut Walker<'_>, y: u32| {
-                let columns = (step / 2..view.width).step_by(step as usize);
-                columns.map(|x| walker.mark(&grid.pixel(x, y), most, &too_coarse)).fold(0.0, f64::max)
-            };
-            let rows: Vec<u32> = (step / 2..view.height).step_by(step as usize).collect();
-            let each = rows.into_par_iter().map_init(|| Walker::new(&field, colors, view), |walker, y| row(walker, y));
-            each.reduce(|| 0.0, f64::max)
-        };
-        let most = walk(f64::INFINITY);
-        walk(share * most);
-        Ok((too_coarse.into_iter().map(AtomicBool::into_inner).collect(), most))
+        let rows: Vec<u32> = (step / 2..view.height).step_by(step as usize).collect();
+        let columns: Vec<u32> = (step / 2..view.width).step_by(step as usize).collect();
+        let pixels: Vec<(f64, Vec<(u32, f64)>)> = rows
+            .into_par_iter()
+            .map_init(
+                || Walker::new(&field, colors, view),
+                |walker, y| columns.iter().map(|&x| walker.causes(&grid.pixel(x, y))).collect::<Vec<_>>(),
+            )
+            .flatten()
+            .collect();
+        let most = pixels.iter().map(|(bound, _)| *bound).fold(0.0, f64::max);
+        let mut too_coarse = vec![false; nodes.len()];
+        for (bound, mut causes) in pixels {
+            if bound <= share * most {
+                continue;
+            }
+            causes.sort_by(|(a, x), (b, y)| y.total_cmp(x).then(a.cmp(b)));
+            let mut left: f64 = causes.iter().map(|(_, change)| change).sum();
+            for (place, change) in causes {
+                if left <= share * most {
+                    break;
+                }
+                left -= change;
+                field.each_cause(place as usize, |cause| too_coarse[cause] = true);
+            }
+        }
+        Ok((too_coarse, most))
     }
 }

@@ -300,7 +300,8 @@ fn error_of(plan: &Plan, drawn: &Drawn) -> Option<report::Error> {
     };
     let against = if budget.is_some() { report::AGAINST_EXACT } else { "full resolution" };
     let bound_against = plan.bound_max.map(|_| against);
-    let error = report::Error { bound_max: plan.bound_max, bound_against, budget, ..report::Error::default() };
+    let error =
+        report::Error { bound_max: plan.bound_max, bound_against, budget, ..report::Error::default() };
     (error != report::Error::default()).then_some(error)
 }
 

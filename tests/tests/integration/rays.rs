@@ -8,6 +8,7 @@ use glam::DVec3;
 use volery::{Camera, ControlPoint, TransferFunction};
 use volery_data::{fill, hash};
 
+mod certified;
 mod invariances;
 mod kinds;
 

@@ -162,6 +162,14 @@ impl Colors {
         a.join(b)
     }
 
+    /// Whether there is a step among the values.
+    pub(super) fn has_step(&self, run: Run) -> bool {
+        run.begins.iter().any(|&begin| {
+            let Change([_, _, slopes]) = &self.change_runs[run.log_length as usize][begin as usize];
+            slopes.iter().flatten().any(|slope| slope.is_infinite())
+        })
+    }
+
     /// The largest `|h_B(v + d) - h_B(v)|`, `|d| <= error`, of a channel, for `v` and `v + d` in the run and `B` in
     /// an interval of [0, 1].
     pub(super) fn change(&self, run: Run, channel: usize, behind: [f64; 2], error: f64) -> f64 {

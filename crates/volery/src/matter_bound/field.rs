@@ -198,48 +198,79 @@ impl Node {
         let finest = layout.nodes(0);
         let range =
             |axis: usize| name.index[axis] << level..((name.index[axis] + 1) << level).min(finest[axis]);
-        let all = range(2).flat_map(|z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z])));
-        for index in all {
+        let all: Vec<[u32; 3]> =
+            range(2).flat_map(|z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z]))).collect();
+        let found = all.into_par_iter().map(|index| {
             let (brick, values) = values(store, NodeName { level: 0, index })?;
             // From the node's first sample to the brick's, in finest cells.
-            let first: [i64; 3] =
-                std::array::from_fn(|axis| i64::from(index[axis]) * per_brick - self.first_cell[axis]);
-            let [nx, ny, nz] = brick.shape.count;
-            let places = (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
-            for (place, value) in places.zip(values) {
-                let place = std::array::from_fn(|axis| (first[axis] + place[axis] as i64) as usize);
-                self.take_sample(place, value, num_cells);
+            let first: [usize; 3] = std::array::from_fn(|axis| {
+                (i64::from(index[axis]) * per_brick - self.first_cell[axis]) as usize
+            });
+            Ok(self.compare_brick(&brick.shape, &values, first))
+        });
+        for ([low, high], errors) in found.collect::<Result<Vec<_>, ReadError>>()? {
+            let mut errors = errors.into_iter();
+            for (z, y) in (low[2]..high[2]).flat_map(|z| (low[1]..high[1]).map(move |y| (z, y))) {
+                let row = (z * num_cells[1] + y) * num_cells[0];
+                for (known, error) in self.errors[row + low[0]..row + high[0]].iter_mut().zip(&mut errors) {
+                    *known = [known[0].min(error[0]), known[1].max(error[1])];
+                }
             }
         }
         Ok(())
     }
 
-    /// Counts a finest sample, so many finest cells from the node's corner, in all cells that it is in or at.
-    fn take_sample(&mut self, place: [usize; 3], value: f32, num_cells: [usize; 3]) {
+    /// How far the exact field is from this node's in the cells that a finest brick is in or at: those cells, and the least
+    /// and largest difference in each.
+    fn compare_brick(
+        &self,
+        shape: &BrickShape,
+        values: &[f32],
+        first: [usize; 3],
+    ) -> ([[usize; 3]; 2], Vec<[f32; 2]>) {
         let size = 1_usize << self.level;
-        let cell: [usize; 3] =
-            std::array::from_fn(|axis| (place[axis] / size).min(num_cells[axis].saturating_sub(1)));
-        let share = |axis: usize| (place[axis] - cell[axis] * size) as f64 / size as f64;
-        let drawn = trilinear(&self.corners(cell), [share(0), share(1), share(2)]);
-        let difference = f64::from(value) - drawn;
-        let error = match (value.is_nan(), drawn.is_nan()) {
-            (true, true) => return,
-            (false, false) if difference == 0.0 => return,
-            (false, false) => {
-                [(difference.min(0.0) as f32).next_down(), (difference.max(0.0) as f32).next_up()]
+        let last = |axis: usize| first[axis] + shape.count[axis] - 1;
+        let most = |axis: usize| self.count[axis].saturating_sub(2);
+        // A sample on a face is in the cells on both sides of it.
+        let low: [usize; 3] =
+            std::array::from_fn(|axis| (first[axis].saturating_sub(1) / size).min(most(axis)));
+        let high: [usize; 3] = std::array::from_fn(|axis| (last(axis) / size).min(most(axis)) + 1);
+        let cells = (low[2]..high[2])
+            .flat_map(|z| (low[1]..high[1]).flat_map(move |y| (low[0]..high[0]).map(move |x| [x, y, z])));
+        let errors = cells.map(|cell| {
+            let corners = self.corners(cell);
+            let range = |axis: usize| {
+                let begin = cell[axis] * size;
+                begin.max(first[axis])..=(begin + size).min(last(axis))
+            };
+            let value = |[x, y, z]: [usize; 3]| {
+                values[((z - first[2]) * shape.count[1] + y - first[1]) * shape.count[0] + x - first[0]]
+            };
+            if corners.iter().any(|corner| corner.is_nan()) {
+                // Nothing is drawn: is there anything?
+                let steps = |axis: usize| range(axis).zip(range(axis).skip(1));
+                let mut finest =
+                    steps(2).flat_map(|z| steps(1).flat_map(move |y| steps(0).map(move |x| [x, y, z])));
+                let is_there = finest.any(|ends| {
+                    let at = |axis: usize, corner: usize| [ends[axis].0, ends[axis].1][corner >> axis & 1];
+                    (0..8).all(|corner| !value([0, 1, 2].map(|axis| at(axis, corner))).is_nan())
+                });
+                return if is_there { [f32::NEG_INFINITY, f32::INFINITY] } else { [0.0; 2] };
             }
-            // Matter beside none.
-            _ => [f32::NEG_INFINITY, f32::INFINITY],
-        };
-        let below = |axis: usize| usize::from(place[axis] == cell[axis] * size && cell[axis] > 0);
-        for z in cell[2] - below(2)..=cell[2] {
-            for y in cell[1] - below(1)..=cell[1] {
-                for x in cell[0] - below(0)..=cell[0] {
-                    let known = &mut self.errors[(z * num_cells[1] + y) * num_cells[0] + x];
-                    *known = [known[0].min(error[0]), known[1].max(error[1])];
+            let share = |axis: usize, place: usize| (place - cell[axis] * size) as f64 / size as f64;
+            let mut error = [0.0_f32; 2];
+            for (z, y) in range(2).flat_map(|z| range(1).map(move |y| (z, y))) {
+                let ends = [0.0, 1.0].map(|x| trilinear(&corners, [x, share(1, y), share(2, z)]));
+                for x in range(0) {
+                    let drawn = mix(ends[0], ends[1], share(0, x));
+                    let [low, high] = difference(f64::from(value([x, y, z])), drawn);
+                    error = [error[0].min(low), error[1].max(high)];
                 }
             }
-        }
+            error
+        });
+        let errors = errors.collect();
+        ([low, high], errors)
     }
 
     /// The values at the corners of a cell.
@@ -266,9 +297,25 @@ impl Node {
     }
 }
 
+/// Least and largest difference of the exact value from one that is drawn.
+fn difference(exact: f64, drawn: f64) -> [f32; 2] {
+    let difference = exact - drawn;
+    if difference.is_nan() {
+        // Matter where there is none.
+        return [f32::NEG_INFINITY, f32::INFINITY];
+    }
+    if difference == 0.0 {
+        return [0.0; 2];
+    }
+    [(difference.min(0.0) as f32).next_down(), (difference.max(0.0) as f32).next_up()]
+}
+
+fn mix(a: f64, b: f64, share: f64) -> f64 {
+    (1.0 - share) * a + share * b
+}
+
 /// A field between the corners of a cell.
 pub(super) fn trilinear(corners: &[f64; 8], [x, y, z]: [f64; 3]) -> f64 {
-    let mix = |a: f64, b: f64, share: f64| if share == 0.0 { a } else { (1.0 - share) * a + share * b };
     let along = |first: usize| mix(corners[first], corners[first + 1], x);
     mix(mix(along(0), along(2), y), mix(along(4), along(6), y), z)
 }

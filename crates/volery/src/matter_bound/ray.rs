@@ -1,15 +1,13 @@
 //! One ray through the field: its pieces, what lies behind each, and what they add up to.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use volery_scene::Ray;
 
 use super::colors::{Colors, Run, Seen};
 use super::field::{Field, Node, trilinear};
 use crate::view::View;
 
-/// Pieces that a cell is cut into where the drawn field is not the exact one: values, and the colour behind, vary less.
-const PIECES: usize = 2;
+/// How often a cell is halved at most.
+const MAX_DEPTH: u32 = 6;
 
 /// What is left of the light where a ray ends: what is behind it may be anything that can be seen.
 const LEAST_CLEAR: f64 = 1e-6;
@@ -70,23 +68,10 @@ impl<'a> Walker<'a> {
         )
     }
 
-    /// The bound of a ray, and marks the nodes that make it larger than `most`: those that change most, until what is left
-    /// of the others' changes is not above it.
-    pub(super) fn mark(&mut self, ray: &Ray, most: f64, too_coarse: &[AtomicBool]) -> f64 {
+    /// The bound of a ray, and what the nodes that it meets may change, by their places.
+    pub(super) fn causes(&mut self, ray: &Ray) -> (f64, Vec<(u32, f64)>) {
         let bound = self.bound(ray).into_iter().fold(0.0, f32::max);
-        if f64::from(bound) > most {
-            let field = self.field;
-            self.changes.sort_by(|(a, x), (b, y)| y.total_cmp(x).then(a.cmp(b)));
-            let mut left: f64 = self.changes.iter().map(|(_, change)| change).sum();
-            for &(place, change) in self.changes.iter().filter(|(_, change)| *change > 0.0) {
-                if left <= most {
-                    break;
-                }
-                left -= change;
-                field.each_cause(place as usize, |cause| too_coarse[cause].store(true, Ordering::Relaxed));
-            }
-        }
-        f64::from(bound)
+        (f64::from(bound), self.changes.iter().filter(|(_, change)| *change > 0.0).copied().collect())
     }
 
     /// Finds the pieces of a ray, front to back.
@@ -163,44 +148,39 @@ impl<'a> Walker<'a> {
     fn add(&mut self, node: &Node, finest: [i64; 3], [from, to]: [[f64; 3]; 2], length: f64) {
         let Some(cell) = node.cell(finest) else { return };
         let place = self.field.place(finest).unwrap_or(0) as u32;
-        let rounding = self.field.rounding;
-        let error = [cell.error[0] - rounding, cell.error[1] + rounding];
-        let all = cell.corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| {
-            [low.min(value), high.max(value)]
-        });
-        let run = self.colors.run(all[0] + error[0] - rounding, all[1] + error[1] + rounding);
-        if self.colors.seen(run).extinction()[1] == 0.0 {
-            return;
-        }
-        let mut rest = bernstein(&cell.corners, [from, to]);
-        let num = if error == [0.0; 2] { 1 } else { PIECES };
-        for left in (1..=num).rev() {
-            let (piece, after) = split(&rest, 1.0 / left as f64);
-            rest = after;
-            let range = piece.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| {
-                [low.min(value), high.max(value)]
-            });
-            // What is drawn may be rounded otherwise than here.
-            let margin = rounding + 1e-12 * (all[1] - all[0]);
-            let values = [range[0] - margin, range[1] + margin];
-            self.add_piece(place, length / num as f64, values, error);
+        let all = range(&cell.corners);
+        // What is drawn may be rounded otherwise than here.
+        let margin = self.field.rounding + 1e-12 * (all[1] - all[0]);
+        let run = self.colors.run(all[0] + cell.error[0] - margin, all[1] + cell.error[1] + margin);
+        if self.colors.seen(run).extinction()[1] > 0.0 {
+            let cubic = bernstein(&cell.corners, [from, to]);
+            self.add_pieces((place, cell.error, margin), &cubic, length, 0);
         }
     }
 
-    fn add_piece(&mut self, place: u32, length: f64, [low, high]: [f64; 2], error: [f64; 2]) {
-        let drawn = self.colors.seen(self.colors.run(low, high));
-        let (mut change, mut seen) = (None, drawn);
-        if error != [0.0; 2] {
-            let run = self.colors.run(low + error[0], high + error[1]);
-            seen = self.colors.seen(run);
-            change = Some((run, error[1].max(-error[0])));
-        }
-        let [extinction, most] = seen.extinction();
-        if most == 0.0 {
+    /// Adds a cubic in pieces in which values, and the colour behind, vary little: more of them where it crosses a step
+    /// of the transfer function, since only near it can the exact field be on the other side.
+    fn add_pieces(&mut self, cell: (u32, [f64; 2], f64), cubic: &[f64; 4], length: f64, depth: u32) {
+        let (place, error, margin) = cell;
+        let [low, high] = range(cubic);
+        let [low, high] = [low - margin, high + margin];
+        let run = self.colors.run(low + error[0], high + error[1]);
+        let is_coarse = error != [0.0; 2];
+        let is_long = || high - low > 2.0 * (error[1] - error[0]) && self.colors.has_step(run);
+        if is_coarse && (depth == 0 || depth < MAX_DEPTH && is_long()) {
+            let (first, rest) = halves(cubic);
+            self.add_pieces(cell, &first, 0.5 * length, depth + 1);
+            self.add_pieces(cell, &rest, 0.5 * length, depth + 1);
             return;
         }
-        self.clear *= (-extinction * length).exp();
-        self.pieces.push(Piece { length, place, drawn, extinction, change, behind: [[0.0; 2]; 3] });
+        let seen = self.colors.seen(run);
+        let drawn = if is_coarse { self.colors.seen(self.colors.run(low, high)) } else { seen };
+        let [extinction, most] = seen.extinction();
+        if most > 0.0 {
+            self.clear *= (-extinction * length).exp();
+            let change = is_coarse.then_some((run, error[1].max(-error[0])));
+            self.pieces.push(Piece { length, place, drawn, extinction, change, behind: [[0.0; 2]; 3] });
+        }
     }
 
     /// Finds what colour lies behind each piece, from the last to the first.
@@ -284,16 +264,23 @@ fn bernstein(corners: &[f64; 8], ends: [[f64; 3]; 2]) -> [f64; 4] {
     ]
 }
 
-/// A cubic up to a share of its way, and the rest.
-fn split(cubic: &[f64; 4], share: f64) -> ([f64; 4], [f64; 4]) {
+/// Least and largest of some values.
+fn range(values: &[f64]) -> [f64; 2] {
+    values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &value| [low.min(value), high.max(value)])
+}
+
+/// Both halves of a cubic.
+fn halves(cubic: &[f64; 4]) -> ([f64; 4], [f64; 4]) {
+    // What is left in place is the second half, from its end on.
     let mut rest = *cubic;
     let first = [3, 2, 1, 0].map(|num| {
         let first = rest[0];
         for i in 0..num {
-            rest[i] += share * (rest[i + 1] - rest[i]);
+            rest[i] += 0.5 * (rest[i + 1] - rest[i]);
         }
         first
     });
-    // What is left in place is the second half, from its end on.
     (first, rest)
 }

@@ -172,7 +172,8 @@ fn pictures(scene: &Scene) -> Option<(MatterBound, [Image; 2])> {
     let source: &dyn NodeSource = &pyramid;
     let drawn_cut = Drawn { view: &view, transfer, source, store: &store };
     let bound = drawn_cut.bound(&cut.nodes, &bricks).expect("in memory");
-    let field = Field::new((source, &store), (&cut.nodes, &bricks), transfer, &mut Known::new()).expect("in memory");
+    let field =
+        Field::new((source, &store), (&cut.nodes, &bricks), transfer, &mut Known::new()).expect("in memory");
     // Cells of nodes without anything to be seen are not kept.
     if field.node([0; 3]).is_none() || bricks.iter().any(|brick| is_clear(&field, brick)) {
         return None;
@@ -182,7 +183,12 @@ fn pictures(scene: &Scene) -> Option<(MatterBound, [Image; 2])> {
         let tracer = Tracer::new(grid, transfer).expect("values");
         tracer.render(camera, *background, view.width, view.height, &|_| ()).expect("small")
     };
-    Some((bound, [picture(&shown), picture(grid)]))
+    // As the texels have it: what rounding does is no part of a bound.
+    let offset = store.layout.value_offset;
+    let texels = (0..grid.samples().len())
+        .map(|place| offset + f64::from((grid.samples().value(place, 0) - offset) as f32));
+    let exact = VoxelGrid::new(grid.dims(), grid.spacing(), texels.collect::<Vec<f64>>()).expect("as before");
+    Some((bound, [picture(&shown), picture(&exact)]))
 }
 
 fn is_clear(field: &Field, brick: &JoinedBrick) -> bool {

@@ -116,7 +116,10 @@ impl Technique<VolumeData> for Raycast {
             _ => {
                 let tolerance = volume.tolerance(view.dial).unwrap_or(0.0);
                 let cut = self.cuts.of(tolerance);
-                (cut.get(&(transfer.clone(), layout.revision), || tolerant(source, transfer, tolerance)), None)
+                (
+                    cut.get(&(transfer.clone(), layout.revision), || tolerant(source, transfer, tolerance)),
+                    None,
+                )
             }
         };
         let (in_view, bricks) = in_view(nodes, view, &seen);
