@@ -3,9 +3,9 @@
 use volery_frame::{Backend, Frame, PictureView};
 use volery_scene::Camera;
 
+use super::oracle::{assert_shows_something, difference};
 use super::parts::{KINDS, Kind, World, wide};
-use super::sampling::assert_shows_something;
-use super::world::{BACKGROUND_F64, difference};
+use super::world::BACKGROUND_F64;
 
 /// Largest difference of a channel: places in f32 that start from the other side. Of rays, where cells are cut by what
 /// is left of the light; of planes, what outlines one pixel wide gain or lose by half a rounding is not counted.
