@@ -158,6 +158,17 @@ fn a9_render_step_at_value_is_exact() {
     }
 }
 
+/// The largest difference of a channel of two pictures, in levels of 256.
+fn distance(shop: &Workshop, names: [&str; 2]) -> f64 {
+    let [a, b] = names.map(|name| {
+        let volume = volery::io::read_volume(&shop.path(name), &volery::io::ReadOptions::default());
+        volume.expect("a picture").grid
+    });
+    let places = (0..a.num_samples()).flat_map(|place| (0..3).map(move |channel| (place, channel)));
+    let differ = |(place, channel)| a.samples().value(place, channel) - b.samples().value(place, channel);
+    places.map(differ).fold(0.0, |most, difference: f64| most.max(difference.abs()))
+}
+
 /// A1 at the command line: left and right never change sides; by index they do, and not in silence.
 #[test]
 fn a1_files_are_drawn_the_right_way_round() {
@@ -184,17 +195,17 @@ fn a1_files_are_drawn_the_right_way_round() {
     let note = "note: the axes of the samples run to LAS; the picture is drawn along them, and so mirrored: left and \
                 right change sides\n";
     for options in ["", "--view right", "--up 0,1,0.1", "--plane sagittal:60 --plane axial"] {
-        let (said, straight) = picture(&format!("ras.nrrd {options}"), "a.png");
+        let (said, _) = picture(&format!("ras.nrrd {options}"), "a.png");
         assert!(!said.contains("axes of the samples"), "{said}");
-        let (said, turned) = picture(&format!("las.nrrd {options}"), "b.png");
-        assert!(straight == turned, "{options}: another picture");
+        let (said, _) = picture(&format!("las.nrrd {options}"), "b.png");
+        assert!(distance(&shop, ["a.png", "b.png"]) <= 1.0, "{options}: another picture");
         assert!(!said.contains("axes of the samples"), "{said}");
         if options.contains("--plane") {
             continue;
         }
-        let (said, by_index) = picture(&format!("las.nrrd {options} --orientation index"), "c.png");
+        let (said, _) = picture(&format!("las.nrrd {options} --orientation index"), "c.png");
         assert!(said.contains(note), "{said}");
-        assert!(by_index != straight, "{options}: the same picture");
+        assert!(distance(&shop, ["a.png", "c.png"]) > 50.0, "{options}: the same picture");
     }
     let info = shop.done("info las.nrrd").stdout;
     assert!(info.contains("axes      LAS\n"), "{info}");

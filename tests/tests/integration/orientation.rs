@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use volery::{
-    BackendChoice, Camera, Dial, Focus, How, InputError, Plane, PlaneView, Session, Thickness, View,
-    ViewOptions, VolumeData, read_input,
+    BackendChoice, Camera, ControlPoint, Dial, Focus, How, InputError, Plane, PlaneView, Session, Thickness,
+    TransferFunction, View, ViewOptions, VolumeData, read_input,
 };
 use volery_reference::Image;
 use volery_scene::{Samples, TriangleMesh, VoxelGrid};
@@ -18,8 +18,10 @@ by_both_backends! {
 
 const SIZE: [u32; 2] = [72, 88];
 
-/// Root mean square difference of a channel.
+/// Root mean square difference of a channel; and of matter where rounding says which cells are cut finer, and so how an
+/// error within the executors' own bound comes out.
 const MAX_RMSE: f64 = 1e-6;
+const MAX_HARD_RMSE: f64 = 1e-5;
 
 /// The head in right, anterior, superior: dims and spacing that differ, a lump on its right cheek.
 fn head() -> VoxelGrid {
@@ -152,12 +154,16 @@ fn mesh() -> TriangleMesh {
     TriangleMesh::new(points, vec![[0, 1, 2]], [0.2, 0.8, 0.4]).unwrap()
 }
 
-/// Named views: of matter where nobody says from where, by every technique; with meshes, planes and a focus.
+/// Named views: of matter where nobody says from where and how, and of thin matter, by every technique; with meshes, planes
+/// and a focus.
 fn views(session: &Session<VolumeData>) -> Vec<(&'static str, View)> {
     let [width, height] = SIZE;
     let view = |how: Option<How>| session.view(&ViewOptions { width, height, how, ..ViewOptions::default() });
     let matter = view(None);
-    let among = View { meshes: [mesh()].into(), ..matter.clone() };
+    let point = |value, level, opacity| ControlPoint { value, color: [level, 0.8, 1.0 - level], opacity };
+    let haze = [point(-1000.0, 0.1, 0.0), point(1600.0, 0.9, 0.05)].to_vec();
+    let thin = View { transfer: TransferFunction::new(haze, 4.0).unwrap().into(), ..matter.clone() };
+    let among = View { meshes: [mesh()].into(), ..thin.clone() };
     let cut = Plane { normal: DVec3::new(0.4, 0.8, -0.3), distance: 2.0 };
     let planes = PlaneView { planes: vec![cut], ..PlaneView::default() };
     let focus = Some(Focus { point: DVec3::new(30.0, 20.0, -10.0), quality: 1e9 });
@@ -165,7 +171,8 @@ fn views(session: &Session<VolumeData>) -> Vec<(&'static str, View)> {
     focused.meshes = [mesh()].into();
     vec![
         ("matter", matter),
-        ("matter and a mesh", among),
+        ("thin matter", thin),
+        ("thin matter and a mesh", among),
         ("three planes", view(Some(How::Planes(PlaneView::default())))),
         ("a plane, a focus, a mesh", focused),
         ("cubes", view(Some(How::Fans(Thickness::Exact)))),
@@ -181,9 +188,20 @@ fn all(session: &mut Session<VolumeData>, backend: &Shared) -> Vec<(&'static str
     views(session).into_iter().map(|(name, view)| (name, drawn(session, &view, backend))).collect()
 }
 
+/// The exact pictures of matter and of planes.
+fn truths(session: &mut Session<VolumeData>, backend: &Shared) -> Vec<(&'static str, Image)> {
+    let views = views(session).into_iter().filter(|(name, _)| !matches!(*name, "matter" | "cubes"));
+    let truth = |(name, view): (&'static str, View)| {
+        let mut picture = session.render(&view, &mut backend.clone()).unwrap();
+        (name, session.verify(&view, &mut picture, &|_| {}).unwrap())
+    };
+    views.map(truth).collect()
+}
+
 /// Of planes and cubes a pixel whose ray runs through an edge may show either side of it.
-fn assert_same(what: &str, found: &Image, expected: &Image) {
-    at_most("rmse", distance(what, found, expected).rmse, MAX_RMSE);
+fn assert_same(what: &str, view: &str, found: &Image, expected: &Image) {
+    let most = if view == "matter" { MAX_HARD_RMSE } else { MAX_RMSE };
+    at_most("rmse", distance(&format!("{what}, {view}"), found, expected).rmse, most);
 }
 
 fn assert_not_mirrored_by_chance(image: &Image) {
@@ -198,6 +216,7 @@ fn files_in_any_order_show_one_head(choice: BackendChoice, test: &str) {
     let head = head();
     let mut session = Session::new(opened("ras.nii", &nifti(&head)).unwrap());
     let expected = all(&mut session, &backend);
+    let exact_pictures = truths(&mut session, &backend);
     assert_not_mirrored_by_chance(&expected[0].1);
     let (yes, no) = (true, false);
     let formats: [(&str, fn(&VoxelGrid) -> Vec<u8>); 3] =
@@ -222,26 +241,11 @@ fn files_in_any_order_show_one_head(choice: BackendChoice, test: &str) {
         assert_eq!(data.grid().dims(), grid.dims());
         let mut session = Session::new(data);
         for ((view, found), (_, expected)) in all(&mut session, &backend).iter().zip(&expected) {
-            assert_same(&format!("{test}, {name} in {file}, {view}"), found, expected);
+            assert_same(&format!("{test}, {name} in {file}"), view, found, expected);
         }
-        let truth = |session: &Session<VolumeData>, view: &View| {
-            let mut picture = Session::render(
-                &mut Session::new(opened(file, &write(&grid)).unwrap()),
-                view,
-                &mut backend.clone(),
-            )
-            .unwrap();
-            session.verify(view, &mut picture, &|_| {}).unwrap()
-        };
-        if number == 0 {
-            for (name, view) in &views(&session)[..4] {
-                let most = distance(
-                    &format!("{name} and the truth"),
-                    &truth(&session, view),
-                    &drawn(&mut session, view, &backend),
-                );
-                at_most("largest difference", most.max, 0.01);
-            }
+        // The exact pictures are of one head, too, whatever the executors make of it.
+        for ((view, found), (_, expected)) in truths(&mut session, &backend).iter().zip(&exact_pictures) {
+            at_most(&format!("{name}, the truth of {view}"), distance(name, found, expected).max, 1e-9);
         }
     }
 }
@@ -262,7 +266,7 @@ fn oblique_heads_are_turned_cameras(choice: BackendChoice, test: &str) {
             let turned = turned(&view, &turn);
             let (found, expected) =
                 (drawn(&mut session, &turned, &backend), drawn(&mut straight, &view, &backend));
-            assert_same(&format!("{test}, {name}"), &found, &expected);
+            assert_same(test, name, &found, &expected);
         }
     }
     let sheared = DAffine3::from_mat3(DMat3::from_cols(

@@ -86,7 +86,10 @@ fn nifti_by_sform_then_qform_then_nothing() {
     );
     let longer = rows([3.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0]);
     let volume = folder.read("a.nii", nifti(sform, &longer));
-    assert_eq!(volume.notes, ["voxels are 3 x 2 x 0.5 by sform, as the world has them, and 1 x 2 x 0.5 by pixdim"]);
+    assert_eq!(
+        volume.notes,
+        ["voxels are 3 x 2 x 0.5 by sform, as the world has them, and 1 x 2 x 0.5 by pixdim"]
+    );
 }
 
 #[test]

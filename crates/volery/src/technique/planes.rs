@@ -270,7 +270,8 @@ const ANATOMICAL_PLANES: fit::Direction =
     fit::Direction { azimuth_deg: 145.0, elevation_deg: 22.0, zoom: 1.0 };
 
 /// A camera that shows planes of the world: from a direction if there is one or if there are several planes, else straight
-/// at the only one, from the side that its normal points to. An image stands upright then, its first row at the top.
+/// at the only one, from the side that its normal points to. An image has x to the right and y downwards then, as its file
+/// has them.
 fn camera(volume: &VolumeData, planes: &[Plane], options: &ViewOptions) -> Camera {
     let (layout, placement) = (volume.source().layout(), volume.placement());
     let is_anatomical = volume.world() == World::Anatomical;
@@ -282,9 +283,10 @@ fn camera(volume: &VolumeData, planes: &[Plane], options: &ViewOptions) -> Camer
         let points: Vec<_> = section.vertices().iter().map(world).collect();
         if !points.is_empty() {
             let normal = plane.normalized().normal;
+            let [right, down] = [DVec3::X, DVec3::Y].map(|axis| placement.direction_to_world(axis));
             let (forward, up) = if layout.dims()[2] == 1 && !is_anatomical {
-                let [right, down] = [DVec3::X, DVec3::Y].map(|axis| placement.direction_to_world(axis));
-                (right.cross(down), -down)
+                // In a plane of its own an image is seen as it is stored.
+                if normal.z.abs() > 0.9 { (DVec3::Z, DVec3::NEG_Y) } else { (right.cross(down), -down) }
             } else if normal.z.abs() > 0.9 {
                 (-normal, DVec3::Y)
             } else {
