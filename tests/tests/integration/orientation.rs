@@ -18,10 +18,13 @@ by_both_backends! {
 
 const SIZE: [u32; 2] = [72, 88];
 
-/// Root mean square difference of a channel; and of matter where rounding says which cells are cut finer, and so how an
-/// error within the executors' own bound comes out.
+/// Root mean square difference of a channel, of planes; of cubes, where a ray may run along an edge; and of matter, whose
+/// values executors round to bins
+/// of the transfer function, each within an error that they state: in another order of samples another cell may be on the
+/// other side of an edge, or be cut finer. Exact pictures have a difference of 1e-9 at most.
 const MAX_RMSE: f64 = 1e-6;
-const MAX_HARD_RMSE: f64 = 1e-5;
+const MAX_CUBE_RMSE: f64 = 5e-6;
+const MAX_MATTER_RMSE: f64 = 2e-5;
 
 /// The head in right, anterior, superior: dims and spacing that differ, a lump on its right cheek.
 fn head() -> VoxelGrid {
@@ -198,9 +201,12 @@ fn truths(session: &mut Session<VolumeData>, backend: &Shared) -> Vec<(&'static 
     views.map(truth).collect()
 }
 
-/// Of planes and cubes a pixel whose ray runs through an edge may show either side of it.
 fn assert_same(what: &str, view: &str, found: &Image, expected: &Image) {
-    let most = if view == "matter" { MAX_HARD_RMSE } else { MAX_RMSE };
+    let most = match view {
+        "cubes" => MAX_CUBE_RMSE,
+        _ if view.contains("matter") => MAX_MATTER_RMSE,
+        _ => MAX_RMSE,
+    };
     at_most("rmse", distance(&format!("{what}, {view}"), found, expected).rmse, most);
 }
 
