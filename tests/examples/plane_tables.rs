@@ -261,7 +261,8 @@ fn figure_6(folder: &Path) -> Result<(), Box<dyn Error>> {
         (planes_of(&mut view).sampling, planes_of(&mut view).shows_nodes) = (sampling, shows_nodes);
         let target = DVec3::new(335.0, 335.0, 0.0);
         let projection = Projection::Orthographic { height: 160.0 };
-        view.camera = Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection };
+        view.camera =
+            Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection, is_mirrored: false };
         pictures.push(session.render(&view)?.image);
     }
     Ok(write_image(&folder.join("planes-figure-6.png"), &sheet(&pictures))?)

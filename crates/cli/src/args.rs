@@ -5,20 +5,22 @@ use std::path::{Path, PathBuf};
 use clap::builder::{OsStringValueParser, PathBufValueParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
-use volery::fit::Direction;
 use volery::glam::DVec3;
 use volery::io::one_of;
 use volery::io::scene_file::{SceneInput, SceneThickness};
-use volery::{BackendChoice, Plane, Preset, View};
+use volery::{BackendChoice, Preset, View};
 
 use crate::wanted;
+use place::{parse_from, parse_plane, parse_up};
 
 mod file;
+mod place;
 mod series;
 mod slice;
 mod stack;
 
 pub(crate) use file::{ChoiceArgs, FileArgs};
+pub(crate) use place::{Orientation, PlaneName, ViewFrom};
 pub(crate) use series::numbered;
 pub(crate) use slice::SliceArgs;
 pub(crate) use stack::StackArgs;
@@ -78,9 +80,18 @@ pub(crate) struct RenderArgs {
     /// Width and height of the picture in pixels [default: the scene's, else 768x768]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub(crate) size: Option<[u32; 2]>,
-    /// From where to look, in degrees, and how near [default: the scene's, else 35,22,1]
-    #[arg(long, value_name = "AZIMUTH,ELEVATION[,ZOOM]", value_parser = parse_view, allow_hyphen_values = true)]
-    pub(crate) view: Option<Direction>,
+    /// From where to look, in degrees or by name (front, back, left, right, top, bottom; of anatomical files anterior,
+    /// posterior, superior, inferior, too), and how near [default: the scene's, else front for anatomical files, else
+    /// 35,22,1]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION|SIDE[,ZOOM]", value_parser = parse_from, allow_hyphen_values = true)]
+    pub(crate) view: Option<ViewFrom>,
+    /// What is up in the picture, as a direction of the world [default: the scene's, else 0,0,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_up, allow_hyphen_values = true)]
+    pub(crate) up: Option<DVec3>,
+    /// Where samples are: where their file says (right, anterior, superior of anatomical files), or at their index times
+    /// the spacing [default: the scene's, else index for scenes and file for other files]
+    #[arg(long, value_enum, value_name = "WORLD")]
+    pub(crate) orientation: Option<Orientation>,
     /// Parallel rays in place of perspective
     #[arg(long)]
     pub(crate) orthographic: bool,
@@ -160,10 +171,12 @@ pub(crate) struct RenderArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Technique plane")]
 pub(crate) struct PlaneArgs {
-    /// The plane of all points x with (NX,NY,NZ) . x = D in world units; may be given several times
+    /// The plane of all points x with (NX,NY,NZ) . x = D in world units; or, of anatomical files, axial, coronal or
+    /// sagittal at a position in millimetres, else through the middle; may be given several times
     /// [default: the image, or three planes through the middle of the volume]
-    #[arg(long = "plane", value_name = "NX,NY,NZ,D", value_parser = parse_plane, allow_hyphen_values = true)]
-    pub(crate) planes: Vec<Plane>,
+    #[arg(long = "plane", value_name = "NX,NY,NZ,D|NAME[:POSITION]", value_parser = parse_plane,
+        allow_hyphen_values = true)]
+    pub(crate) planes: Vec<PlaneName>,
     /// Full detail at this world position, less elsewhere
     #[arg(long, value_name = "X,Y[,Z]", value_parser = parse_focus, allow_hyphen_values = true)]
     pub(crate) focus: Option<DVec3>,
@@ -401,20 +414,6 @@ fn whole(max: u32) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync
     }
 }
 
-fn parse_view(text: &str) -> Result<Direction, String> {
-    let expected = "expected AZIMUTH,ELEVATION or AZIMUTH,ELEVATION,ZOOM: degrees, and a zoom above 0";
-    let numbers: Vec<f64> =
-        text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| expected)?;
-    let (azimuth_deg, elevation_deg, zoom) = match numbers[..] {
-        [azimuth, elevation] => (azimuth, elevation, 1.0),
-        [azimuth, elevation, zoom] => (azimuth, elevation, zoom),
-        _ => return Err(expected.to_owned()),
-    };
-    let good = azimuth_deg.is_finite() && elevation_deg.is_finite() && (1e-3..=1e3).contains(&zoom);
-    let wrong = || "expected finite degrees, and a zoom from 0.001 to 1000".to_owned();
-    good.then_some(Direction { azimuth_deg, elevation_deg, zoom }).ok_or_else(wrong)
-}
-
 fn parse_budget(text: &str) -> Result<f64, String> {
     let found = text.parse().ok();
     let good = found.filter(|budget: &f64| *budget >= 0.0 && budget.is_finite());
@@ -449,17 +448,6 @@ fn parse_background(text: &str) -> Result<[f64; 3], String> {
     let color = numbers(text).and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
     let color = color.filter(|color| color.iter().all(|channel| (0.0..=1.0).contains(channel)));
     color.ok_or_else(|| "expected R,G,B: three numbers from 0 to 1".to_owned())
-}
-
-fn parse_plane(text: &str) -> Result<Plane, String> {
-    let expected = "expected NX,NY,NZ,D: a normal of length above 0, and a number";
-    let numbers = numbers(text);
-    let Some(&[x, y, z, distance]) = numbers.as_deref() else { return Err(expected.to_owned()) };
-    let plane = Plane { normal: DVec3::new(x, y, z), distance };
-    match plane.defects().first() {
-        None => Ok(plane),
-        Some(defect) => Err(defect.to_string()),
-    }
 }
 
 fn parse_focus(text: &str) -> Result<DVec3, String> {

@@ -4,12 +4,12 @@ use std::ffi::OsStr;
 use std::path::Path;
 
 use volery::io::is_grid;
-use volery::io::scene_file::{SceneBackend, SceneFile, SceneTechnique};
+use volery::io::scene_file::{SceneBackend, SceneFile, SceneInput, SceneTechnique};
 use volery::output::write_image;
 use volery::report;
 use volery::{
     Backend, BackendChoice, Data, How, Input, InputData, InputOptions, Picture, RenderError, Session, Step,
-    View, VolumeData, VoxelGrid,
+    View, VolumeData,
 };
 
 mod empty;
@@ -41,7 +41,8 @@ impl Run<'_> {
 }
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let options = InputOptions { data_dir: args.data.clone(), input: args.file.of_scene() };
+    let of_file = SceneInput { orientation: args.orientation.map(Into::into), ..args.file.of_scene() };
+    let options = InputOptions { data_dir: args.data.clone(), input: of_file };
     let plan = options.find(&args.input)?;
     let mut wanted = wanted::over(args, plan.scene.as_ref(), plan.input.clone());
     wanted.meshes.clone_from(&plan.meshes);
@@ -81,7 +82,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     match &run.input.data {
         InputData::Grid(file) => grid::run(&run, file, &steps, backend),
         InputData::Stack(mesh) => grid::run_stack(&run, mesh, backend),
-        InputData::Volume(volume) => run_volume(&run, &volume.grid, backend),
+        InputData::Volume(_) => run_volume(&run, backend),
     }
 }
 
@@ -133,7 +134,7 @@ fn how(wanted: &SceneFile, volume: &VolumeData) -> (How, Option<Given>) {
     (wanted::how(wanted, technique), because)
 }
 
-fn run_volume(run: &Run, grid: &VoxelGrid, backend: &mut dyn Backend) -> Result<(), Failure> {
+fn run_volume(run: &Run, backend: &mut dyn Backend) -> Result<(), Failure> {
     let Run { args, wanted, input, .. } = run;
     if wanted.technique == Some(SceneTechnique::Stack) {
         return Err(needs_grid(input, "--technique stack"));
@@ -146,10 +147,11 @@ fn run_volume(run: &Run, grid: &VoxelGrid, backend: &mut dyn Backend) -> Result<
     }
     let mut session = {
         let _busy = Progress::spinner("building the pyramid");
-        let volume = VolumeData::new(grid.clone());
-        Session::new(volume.map_err(|error| Failure::of_file(&input.path, error))?)
+        Session::new(input.volume_data()?)
     };
-    let (how, because) = how(wanted, session.data());
+    let (mut how, because) = how(wanted, session.data());
+    let place = (session.data().world(), session.data().middle());
+    wanted::place_planes(args, &mut how, place).map_err(|problem| Failure::of_file(&input.path, problem))?;
     let view = wanted::view(args, wanted, input, &session, how)?;
     if let Some(folder) = &args.progressive {
         progressive(folder, (&mut session, backend), &view, input)?;

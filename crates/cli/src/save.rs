@@ -2,23 +2,25 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use volery::io::scene_file::{SceneFile, SceneMesh, ScenePlane, SceneTransfer};
+use volery::io::scene_file::{SceneFile, SceneMesh, SceneOrientation, ScenePlane, SceneTransfer};
 use volery::{How, Plane, Transfer, View};
 
 use crate::{Failure, wanted};
 
-/// Writes what was wanted, with everything that was left open as it was found for this view.
+/// Writes what was wanted, with everything that was left open as it was found for this view; `orientation` is where the
+/// samples of a file are that has a world of its own.
 pub(crate) fn save_scene(
     path: &Path,
     wanted: &SceneFile,
     view: &View,
-    has_colors: bool,
+    (orientation, has_colors): (Option<SceneOrientation>, bool),
 ) -> Result<(), Failure> {
     let mut scene = wanted.clone();
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     scene.input.file = relative(folder, &scene.input.file);
     let mesh = |SceneMesh { file, color }: SceneMesh| SceneMesh { file: relative(folder, &file), color };
     scene.meshes = scene.meshes.into_iter().map(mesh).collect();
+    scene.input.orientation = orientation.or(scene.input.orientation);
     scene.size = Some([view.width, view.height]);
     scene.background = Some(view.background);
     scene.camera = Some(view.camera);

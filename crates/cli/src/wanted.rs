@@ -9,14 +9,14 @@ use volery::io::scene_file::{
     SceneTransfer,
 };
 use volery::io::transfer::{TransferError, TransferOptions, TransferProblem};
-use volery::io::{one_of, read_transfer, read_transfer_2d};
+use volery::io::{World, one_of, read_transfer, read_transfer_2d};
 use volery::{
     Data, Deadline, Dial, Focus, How, Input, InputData, Plane, PlaneView, Preset, Sampling, Session, Slicing,
     StackView, Thickness, View, ViewOptions,
 };
 
 use crate::Failure;
-use crate::args::{BackendName, RenderArgs, Technique, Transfer};
+use crate::args::{BackendName, PlaneName, RenderArgs, Technique, Transfer};
 
 /// An option that one technique alone reads, as the command line or a scene writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,7 +125,11 @@ pub(crate) fn conflict(wanted: &SceneFile, is_of_scene: bool) -> Option<String> 
 pub(crate) fn over(args: &RenderArgs, scene: Option<&SceneFile>, input: SceneInput) -> SceneFile {
     let scene = scene.cloned().unwrap_or_default();
     let (planes, stack) = (&args.planes, &args.stack);
-    let plane = |plane: &Plane| ScenePlane { normal: plane.normal.to_array(), distance: plane.distance };
+    // Those by name have a place once the data are known: `place_planes`.
+    let plane = |plane: &PlaneName| match *plane {
+        PlaneName::Equation(Plane { normal, distance }) => ScenePlane { normal: normal.to_array(), distance },
+        PlaneName::Anatomical { normal, .. } => ScenePlane { normal: normal.to_array(), distance: 0.0 },
+    };
     let own_planes: Vec<_> = planes.planes.iter().map(plane).collect();
     let focus = planes.focus.map(|point| SceneFocus { point: point.to_array(), quality: planes.quality });
     let preset = match &args.transfer {
@@ -204,12 +208,16 @@ pub(crate) fn view<D: Data>(
             Some(session.data().preset_over(preset, range).into())
         }
     };
+    let world = session.data().world();
+    let direction = args.view.map(|view| view.direction(world, args.up.unwrap_or(DVec3::Z))).transpose();
+    let direction = direction.map_err(|problem| Failure::of_file(&input.path, problem))?;
     let defaults = ViewOptions::default();
     let [width, height] = wanted.size.unwrap_or([defaults.width, defaults.height]);
     let options = ViewOptions {
         width,
         height,
-        direction: args.view,
+        direction,
+        up: args.up,
         orthographic: args.orthographic,
         transfer,
         range,
@@ -218,6 +226,7 @@ pub(crate) fn view<D: Data>(
     let mut view = session.view(&options);
     if let Some(camera) = wanted.camera {
         view.camera = if args.orthographic { fit::orthographic(&camera) } else { camera };
+        view.camera.up = args.up.unwrap_or(camera.up);
     }
     view.background = wanted.background.unwrap_or(view.background);
     view.dial = match (wanted.tolerance, wanted.error, wanted.budget_ms) {
@@ -302,6 +311,21 @@ fn unknown_preset(name: &str) -> Failure {
     let names: Vec<_> = Preset::all().map(Preset::name).collect();
     let (name, known) = (name.escape_debug(), one_of(name, &names));
     Failure::undone(format!("transfer function '{name}' is unknown, expected one of {known}"))
+}
+
+/// Puts planes that the command line names where they are in data of a world with that middle.
+pub(crate) fn place_planes(
+    args: &RenderArgs,
+    how: &mut How,
+    (world, middle): (World, DVec3),
+) -> Result<(), String> {
+    if let How::Planes(planes) = how
+        && !args.planes.planes.is_empty()
+    {
+        let own = args.planes.planes.iter().map(|name| name.plane(world, middle));
+        planes.planes = own.collect::<Result<_, _>>()?;
+    }
+    Ok(())
 }
 
 fn plane_view(wanted: &SceneFile) -> PlaneView {

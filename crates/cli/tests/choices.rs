@@ -194,6 +194,7 @@ fn the_report_says_where_samples_lie() {
         assert_eq!(input["orientation"], code);
         let rows = json!([[-2.0, 0.0, 0.0, 90.0], [0.0, 1.0, 0.0, -126.5], [0.0, 0.0, 0.5, 7.0]]);
         assert_eq!(input["world_from_index"], rows);
+        assert_eq!(input["drawn_by"], "file");
         let text = shop.done("info placed.nrrd --json").stdout;
         let info: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
         assert_eq!(info["orientation"], input["orientation"]);

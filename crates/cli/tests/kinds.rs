@@ -158,19 +158,93 @@ fn a9_render_step_at_value_is_exact() {
     }
 }
 
-/// A1 at the command line: left and right never change sides in silence.
+/// The largest difference of a channel of two pictures, in levels of 256.
+fn distance(shop: &Workshop, names: [&str; 2]) -> f64 {
+    let [a, b] = names.map(|name| {
+        let volume = volery::io::read_volume(&shop.path(name), &volery::io::ReadOptions::default());
+        volume.expect("a picture").grid
+    });
+    let places = (0..a.num_samples()).flat_map(|place| (0..3).map(move |channel| (place, channel)));
+    let differ = |(place, channel)| a.samples().value(place, channel) - b.samples().value(place, channel);
+    places.map(differ).fold(0.0, |most, difference: f64| most.max(difference.abs()))
+}
+
+/// A1 at the command line: left and right never change sides; by index they do, and not in silence.
 #[test]
-fn a1_orientation_is_said_by_render_and_info() {
+fn a1_files_are_drawn_the_right_way_round() {
     let shop = Workshop::new();
     let grid = head();
-    let mut flipped = volery::glam::DAffine3::from_scale(grid.spacing());
-    flipped.matrix3.x_axis = -flipped.matrix3.x_axis;
-    let placed = grid.with_world_from_index(flipped).expect("axes that span space");
-    volery::io::write_nrrd(&shop.path("las.nrrd"), &placed, volery::io::World::Anatomical).expect("a volume");
-    let note = "the axes of the samples run to LAS; pictures are drawn along them, and so mirrored: left and right \
-                change sides";
-    let said = shop.done("render las.nrrd -o a.png --size 24x24").stdout;
-    assert!(said.contains(&format!("note: {note}\n")), "{said}");
+    let (dims, values) = (grid.dims(), grid.samples());
+    let mut map = volery::glam::DAffine3::from_scale(grid.spacing());
+    let ras = grid.clone().with_world_from_index(map).expect("axes that span space");
+    // Index x runs to the left, from the right end.
+    map.translation.x = grid.extent().x;
+    map.matrix3.x_axis = -map.matrix3.x_axis;
+    let place = |i: usize| i - i % dims[0] + dims[0] - 1 - i % dims[0];
+    let backwards: Vec<i16> = (0..values.len()).map(|i| values.value(place(i), 0) as i16).collect();
+    let las = volery::VoxelGrid::new(dims, grid.spacing(), backwards).expect("a grid");
+    let las = las.with_world_from_index(map).expect("axes that span space");
+    for (name, grid) in [("ras.nrrd", &ras), ("las.nrrd", &las)] {
+        volery::io::write_nrrd(&shop.path(name), grid, volery::io::World::Anatomical).expect("a volume");
+    }
+    let size = "--size 24x24 --backend software";
+    let picture = |options: &str, name: &str| {
+        let said = shop.done(&format!("render {options} {size} -o {name}")).stdout;
+        (said, shop.bytes(name))
+    };
+    let note = "note: the axes of the samples run to LAS; the picture is drawn along them, and so mirrored: left and \
+                right change sides\n";
+    for options in ["", "--view right", "--up 0,1,0.1", "--plane sagittal:60 --plane axial"] {
+        let (said, _) = picture(&format!("ras.nrrd {options}"), "a.png");
+        assert!(!said.contains("axes of the samples"), "{said}");
+        let (said, _) = picture(&format!("las.nrrd {options}"), "b.png");
+        assert!(distance(&shop, ["a.png", "b.png"]) <= 1.0, "{options}: another picture");
+        assert!(!said.contains("axes of the samples"), "{said}");
+        if options.contains("--plane") {
+            continue;
+        }
+        let (said, _) = picture(&format!("las.nrrd {options} --orientation index"), "c.png");
+        assert!(said.contains(note), "{said}");
+        // From the front in place of from behind, at least.
+        assert!(!options.is_empty() || distance(&shop, ["a.png", "c.png"]) > 50.0, "the same picture");
+    }
     let info = shop.done("info las.nrrd").stdout;
-    assert!(info.contains("axes      LAS\n") && info.contains(note), "{info}");
+    assert!(info.contains("axes      LAS\n"), "{info}");
+    // Scenes ask for it, and those that the program writes do.
+    shop.write("scene.json", r#"{"input": {"file": "las.nrrd"}}"#);
+    assert!(picture("scene.json", "d.png").0.contains(note));
+    picture("las.nrrd --view left --save-scene saved.json", "e.png");
+    assert_eq!(shop.json("saved.json")["input"]["orientation"], "file");
+    assert_eq!(picture("saved.json", "f.png").1, shop.bytes("e.png"));
+}
+
+#[test]
+fn sides_and_slices_of_patients_need_a_patient() {
+    let shop = Workshop::new();
+    for (options, words) in [
+        ("--view anterior", ["waves.nrrd: has no anatomical axes", "--view anterior"]),
+        ("--plane coronal:3", ["waves.nrrd: has no anatomical axes", "--plane coronal"]),
+    ] {
+        shop.run_line(&format!("render waves.nrrd {options} -o a.png")).fails(1, &words);
+    }
+    for (options, words) in [
+        ("--view fromt", ["--view", "front"]),
+        ("--view front,0", ["--view", "zoom"]),
+        ("--up 0,0,0", ["--up", "length above 0"]),
+        ("--plane axial:x", ["--plane", "axial:POSITION"]),
+    ] {
+        let outcome = shop.run_line(&format!("render waves.nrrd {options} -o a.png"));
+        assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+        assert!(words.iter().all(|word| outcome.stderr.contains(word)), "{}", outcome.stderr);
+    }
+    // The front of what is no patient is the side of low y, and up is where somebody says.
+    shop.done("render waves.nrrd --view 0,0 --size 24x24 -o a.png --backend software");
+    shop.done("render waves.nrrd --view front --size 24x24 -o b.png --backend software");
+    assert_eq!(shop.bytes("a.png"), shop.bytes("b.png"));
+    shop.done(
+        "render waves.nrrd --view top --up 0,1,0 --size 24x24 -o a.png --backend software --report r.json",
+    );
+    let camera = shop.json("r.json")["camera"].clone();
+    assert!(camera["up"][1].as_f64() > Some(0.99), "{camera}");
+    assert!(camera["eye"][2].as_f64() > Some(60.0), "{camera}");
 }

@@ -19,7 +19,7 @@ pub fn thousands_of_thin_layers(backend: &mut dyn Backend) {
     let target = DVec3::new(2.0, 2.0, 2048.0);
     let (up, projection) = (DVec3::Y, Projection::Orthographic { height: 6.0 });
     for eye in [DVec3::new(2.0, 2.0, 5000.0), DVec3::new(3.3, 1.1, -900.0)] {
-        let camera = Camera { eye, target, up, projection };
+        let camera = Camera { eye, target, up, projection, is_mirrored: false };
         let size = [12, 12];
         let expected = march_volume(&volume, &tf, 16.0, &camera, size, BACKGROUND_F64);
         assert_shows_something("thin layers", &expected, BACKGROUND_F64);

@@ -187,7 +187,7 @@ impl Field<'_> {
 
 fn perspective(eye: DVec3, target: DVec3, fov_y_deg: f64) -> Camera {
     let up = if (target - eye).normalize().z.abs() > 0.99 { DVec3::Y } else { DVec3::Z };
-    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg } }
+    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg }, is_mirrored: false }
 }
 
 const ORANGE: [f32; 3] = [1.0, 0.5, 0.1];
@@ -248,7 +248,7 @@ pub fn cubes_around_the_eye(backend: &mut dyn Backend) {
     }
     let eye = DVec3::new(5.4, 5.2, 5.3);
     let projection = Projection::Orthographic { height: 7.0 };
-    let camera = Camera { eye, target: eye + along, up: DVec3::Z, projection };
+    let camera = Camera { eye, target: eye + along, up: DVec3::Z, projection, is_mirrored: false };
     assert_like_chords(backend, "across the orthographic plane", &layout, &[CUBE], Thickness::Exact, &camera);
 }
 
@@ -396,7 +396,7 @@ pub fn rays_in_shared_faces_count_once(backend: &mut dyn Backend) {
             // A pixel per half cell, all centres on lattice planes.
             let eye = DVec3::splat(7.75) + axis * side * 20.0;
             let projection = Projection::Orthographic { height: 15.0 };
-            let camera = Camera { eye, target: eye - axis * side, up, projection };
+            let camera = Camera { eye, target: eye - axis * side, up, projection, is_mirrored: false };
             let mut whole = field(&layout, &camera, [0.3, 1.0], 1.0, 3);
             whole.iter_mut().for_each(|cube| (cube.color, cube.extinction) = (ORANGE, 0.05));
             let size = [30, 30];

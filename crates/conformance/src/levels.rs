@@ -25,6 +25,7 @@ fn cameras(extent: DVec3) -> [Camera; 3] {
         target: extent,
         up: DVec3::Z,
         projection: Projection::Perspective { fov_y_deg: 80.0 },
+        is_mirrored: false,
     };
     [Camera::fitted(extent, 35.0, 25.0, 1.2, false), Camera::fitted(extent, 215.0, -30.0, 1.2, true), inside]
 }

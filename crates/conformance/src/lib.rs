@@ -27,6 +27,7 @@ mod cubes;
 mod hand_on;
 mod levels;
 mod matter;
+mod mirror;
 mod oracle;
 mod order;
 mod outlines;
@@ -102,6 +103,8 @@ properties! { $
         camera_looking_away_sees_the_background
         volume_behind_the_orthographic_plane
         smooth_field_in_perspective;
+    mirror:
+        mirrored_cameras_exchange_left_and_right;
     sampling:
         tiny_spacing
         huge_spacing
@@ -239,6 +242,7 @@ mod tests {
         let sources = [
             include_str!("matter.rs"),
             include_str!("views.rs"),
+            include_str!("mirror.rs"),
             include_str!("sampling.rs"),
             include_str!("levels.rs"),
             include_str!("seams.rs"),

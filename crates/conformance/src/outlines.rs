@@ -54,6 +54,7 @@ fn cameras() -> [(&'static str, Camera); 5] {
         target: DVec3::ZERO,
         up: DVec3::new(0.1, 1.0, 0.2),
         projection,
+        is_mirrored: false,
     };
     let perspective = Projection::Perspective { fov_y_deg: 45.0 };
     let parallel = Projection::Orthographic { height: 3.0 };

@@ -26,6 +26,7 @@ fn cameras(extent: DVec3) -> [Camera; 3] {
         target: extent,
         up: DVec3::Z,
         projection: Projection::Perspective { fov_y_deg: 80.0 },
+        is_mirrored: false,
     };
     [Camera::fitted(extent, 35.0, 25.0, 1.2, false), Camera::fitted(extent, 215.0, -30.0, 1.2, true), inside]
 }
@@ -300,7 +301,8 @@ pub fn images_are_volumes_of_one_layer(backend: &mut dyn Backend) {
             for projection in
                 [Projection::Perspective { fov_y_deg: 30.0 }, Projection::Orthographic { height: 9.0 }]
             {
-                let camera = Camera { eye: target - toward * 18.0, target, up, projection };
+                let camera =
+                    Camera { eye: target - toward * 18.0, target, up, projection, is_mirrored: false };
                 for sampling in [Sampling::Linear, Sampling::Nearest] {
                     let plane = Plane { normal: normal * 3.0, distance: 0.0 };
                     let look = Look { sampling, ..Look::opaque(vec![plane], colors()) };
@@ -459,6 +461,7 @@ pub fn few_bricks_in_a_large_volume(backend: &mut dyn Backend) {
         target,
         up: DVec3::Y,
         projection: Projection::Perspective { fov_y_deg: 40.0 },
+        is_mirrored: false,
     };
     let distance = |level: u32, first: [u32; 3]| {
         let middle = [0, 1].map(|axis| f64::from(first[axis] + (1 << level)) - target[axis]);

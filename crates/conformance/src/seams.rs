@@ -216,6 +216,7 @@ pub fn levels_do_not_jump(backend: &mut dyn Backend) {
                 target: place,
                 up: axis(across as usize),
                 projection: Projection::Orthographic { height: 1.2e-5 },
+                is_mirrored: false,
             };
             let bricks = bricks(&volume, &camera, &finest);
             let jump = |joined: &[JoinedBrick], backend: &mut dyn Backend| {

@@ -31,7 +31,7 @@ const ORANGE: [f32; 3] = [1.0, 0.5, 0.1];
 
 fn perspective(eye: DVec3, target: DVec3, fov_y_deg: f64) -> Camera {
     let up = if (target - eye).normalize().z.abs() > 0.99 { DVec3::Y } else { DVec3::Z };
-    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg } }
+    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg }, is_mirrored: false }
 }
 
 /// A stack of squares around the origin, from -1 to 1 on all sides, of smooth values from 0 to 1.
@@ -183,7 +183,7 @@ pub fn triangles_share_sides_without_gap_or_overlap(backend: &mut dyn Backend) {
         for middle in [DVec3::ZERO, DVec3::new(0.5, 0.5, 0.0), DVec3::new(0.25, 0.0, 0.0)] {
             let eye = middle + DVec3::Z * 5.0;
             let projection = Projection::Orthographic { height: 40.0 };
-            let camera = Camera { eye, target: middle, up: DVec3::Y, projection };
+            let camera = Camera { eye, target: middle, up: DVec3::Y, projection, is_mirrored: false };
             let expected = each_pixel(&camera, [40, 40], |_| expected_at(0.7));
             let image = scene.draw(backend, &camera, [40, 40]);
             assert_close(&format!("sides on centres, {cells} cells"), &image, &expected, 1e-4, 2e-5);
@@ -367,6 +367,7 @@ pub fn eyes_inside_stacks(backend: &mut dyn Backend) {
             target: DVec3::new(1.0, 0.7, -0.6),
             up: DVec3::Z,
             projection: Projection::Orthographic { height: 2.5 },
+            is_mirrored: false,
         };
         scene.check(&format!("orthographic inside, normal {normal}"), backend, &camera, MAX);
     }

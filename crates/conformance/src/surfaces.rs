@@ -152,7 +152,13 @@ fn assert_like(what: &str, mut image: Image, camera: &Camera, light: impl Fn(&Ra
 
 fn perspective(eye: DVec3) -> Camera {
     let target = DVec3::new(10.0, 10.0, 9.0);
-    Camera { eye, target, up: DVec3::Z, projection: Projection::Perspective { fov_y_deg: 45.0 } }
+    Camera {
+        eye,
+        target,
+        up: DVec3::Z,
+        projection: Projection::Perspective { fov_y_deg: 45.0 },
+        is_mirrored: false,
+    }
 }
 
 fn orthographic(eye: DVec3) -> Camera {

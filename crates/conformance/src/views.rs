@@ -18,7 +18,7 @@ fn rings() -> Volume {
 
 fn perspective(eye: DVec3, target: DVec3, fov_y_deg: f64) -> Camera {
     let up = if (target - eye).normalize().z.abs() > 0.99 { DVec3::Y } else { DVec3::Z };
-    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg } }
+    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg }, is_mirrored: false }
 }
 
 fn assert_like_the_march(backend: &mut dyn Backend, what: &str, camera: &Camera) {
@@ -87,7 +87,7 @@ pub fn axis_aligned_views_on_sample_planes(backend: &mut dyn Backend) {
                 // One pixel per cell, centres on the sample planes.
                 Projection::Orthographic { height: 33.0 },
             ] {
-                let camera = Camera { eye, target: middle, up, projection };
+                let camera = Camera { eye, target: middle, up, projection, is_mirrored: false };
                 let mut expected = march_volume(&volume, &tf, 24.0, &camera, size, BACKGROUND_F64);
                 assert_shows_something("axis-aligned", &expected, BACKGROUND_F64);
                 let mut image = draw(backend, &volume, &tf, &camera, size);
@@ -144,7 +144,7 @@ pub fn volume_behind_the_orthographic_plane(backend: &mut dyn Backend) {
     let (away, up) = (DVec3::new(0.3, 1.0, 0.2), DVec3::Z);
     let projection = Projection::Orthographic { height: 40.0 };
     let eye = DVec3::new(16.0, 40.0, 14.0);
-    let behind = Camera { eye, target: eye + away, up, projection };
+    let behind = Camera { eye, target: eye + away, up, projection, is_mirrored: false };
     let image = draw(backend, &volume, &smooth_transfer(1.0), &behind, SIZE);
     assert_background("all behind the plane", &image, BACKGROUND);
     let eye = DVec3::new(15.7, 11.6, 14.2);

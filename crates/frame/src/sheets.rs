@@ -319,7 +319,7 @@ mod tests {
     fn a_light_along_the_view_shows_full_colour_where_the_gradient_meets_the_viewer() {
         let eye = DVec3::new(3.0, 0.0, 4.0);
         let projection = Projection::Perspective { fov_y_deg: 30.0 };
-        let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, projection };
+        let camera = Camera { eye, target: DVec3::ZERO, up: DVec3::Y, projection, is_mirrored: false };
         let light = Light::along_view(&camera, 0.25);
         let expected = [0.6, 0.0, 0.8];
         assert!((0..3).all(|i| (light.toward[i] - expected[i]).abs() < 1e-6), "{:?}", light.toward);

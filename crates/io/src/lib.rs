@@ -20,10 +20,9 @@
 //!   be changed while the volume lives, as with every memory map.
 //!
 //! # Conventions
-//! A sample is drawn at its index times the spacing. Where the file says that it lies is carried beside that, as
+//! Where a file says that samples lie is carried beside them, as
 //! [`world_from_index`](volery_scene::VoxelGrid::world_from_index): in right, anterior, superior for anatomical
-//! files, in the file's own axes for others ([`World`]); where the two differ by more than place and size, a note says
-//! so. Pictures hold linear values without gamma, row 0 at the top.
+//! files, in the file's own axes for others ([`World`]). Pictures hold linear values without gamma, row 0 at the top.
 //!
 //! # Non-goals
 //! Materials of meshes; polyhedra and cells without volume; netCDF-4; DICOM; colours of palettes.

@@ -7,9 +7,10 @@
 //! is turned by its sign. Of other files (VTK, TIFF, and NRRD without a space) it is the world of the file as it
 //! is. Lengths are in the file's unit, millimetres in anatomical files.
 //!
-//! Pictures are drawn along the axes of the samples, so a note is due wherever these are not those of the world.
+//! A picture that is drawn along the axes of the samples needs a note wherever these are not those of the world.
 
 use glam::{DAffine3, DMat3, DVec3};
+use volery_scene::placement::nearest_axes;
 
 /// Degrees between axes that nobody sees.
 const MIN_DEGREES: f64 = 0.1;
@@ -85,14 +86,8 @@ impl Orientation {
         let directions = world_from_index.matrix3.to_cols_array_2d().map(|axis| {
             DVec3::from_array(axis).normalize_or_zero() // Of length 1: the map can be turned back.
         });
-        // Of the six ways to pair axes, the one that is nearest.
-        const PAIRS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-        let nearness = |pairs: &[usize; 3]| -> f64 { (0..3).map(|i| directions[i][pairs[i]].abs()).sum() };
-        // Half way between two, rounding does not decide.
-        let better = |best: [usize; 3], pairs: [usize; 3]| {
-            if nearness(&pairs) > nearness(&best) + 1e-9 { pairs } else { best }
-        };
-        let nearest = PAIRS.into_iter().fold(PAIRS[0], better);
+        let axes = nearest_axes(world_from_index.matrix3);
+        let nearest = axes.map(|(axis, _)| axis);
         let along = |i: usize| directions[i][nearest[i]];
         let degrees = |i: usize| {
             let across = directions[i] - along(i) * DVec3::AXES[nearest[i]];
@@ -101,7 +96,7 @@ impl Orientation {
         let right_angle =
             |i: usize, j: usize| directions[i].dot(directions[j]).abs() < MIN_DEGREES.to_radians();
         Self {
-            axes: [0, 1, 2].map(|i| (nearest[i], along(i) >= 0.0)),
+            axes,
             world,
             degrees: (0..3).map(degrees).fold(0.0, f64::max),
             is_sheared: !(right_angle(0, 1) && right_angle(1, 2) && right_angle(0, 2)),
@@ -119,9 +114,9 @@ impl Orientation {
         self.is_mirrored
     }
 
-    /// What a user has to know while pictures are drawn along the axes of the samples; `None` where these are those
+    /// What a user has to know of a picture that is drawn along the axes of the samples; `None` where these are those
     /// of the world.
-    pub(crate) fn note(&self) -> Option<String> {
+    pub fn note(&self) -> Option<String> {
         if self.is_identity() {
             return None;
         }
@@ -130,7 +125,9 @@ impl Orientation {
             (true, World::Plain) => "mirrored",
             (false, _) => "turned against the world of the file",
         };
-        Some(format!("the axes of the samples run to {self}; pictures are drawn along them, and so {shown}"))
+        Some(format!(
+            "the axes of the samples run to {self}; the picture is drawn along them, and so {shown}"
+        ))
     }
 }
 

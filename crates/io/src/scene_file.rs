@@ -139,6 +139,9 @@ pub struct SceneInput {
     /// World distance of neighbouring samples, in place of the file's.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::spacing")]
     pub spacing: Option<[f64; 3]>,
+    /// Where samples are; missing for those at index times spacing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<SceneOrientation>,
     /// The array to draw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub array: Option<String>,
@@ -158,6 +161,16 @@ pub enum InputKind {
     Volume,
     /// Cells.
     Grid,
+}
+
+/// Where the samples of a volume are in the world of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SceneOrientation {
+    /// Where their file says: in right, anterior, superior for anatomical files.
+    File,
+    /// At index times spacing, whatever the file says.
+    Index,
 }
 
 /// How a scene is drawn.
@@ -248,7 +261,7 @@ fn usual_quality() -> f64 {
 impl SceneInput {
     /// How to read the file with [`read_volume`](crate::read_volume).
     pub fn read_options(&self) -> ReadOptions {
-        let Self { kind: _, file: _, dims, dtype, spacing, array, channel, time_step } = self.clone();
+        let Self { dims, dtype, spacing, array, channel, time_step, .. } = self.clone();
         let spacing = spacing.map(glam::DVec3::from_array);
         ReadOptions { dims, element: dtype, spacing, array, channel, time_step, ..ReadOptions::default() }
     }

@@ -173,10 +173,7 @@ impl Decoded {
         let mut world = World::Plain;
         if let Some(Placement { world_from_index, world: of_file }) = placement {
             match grid.clone().with_world_from_index(world_from_index) {
-                Ok(placed) => {
-                    notes.extend(Orientation::of(&world_from_index, of_file).note());
-                    (grid, world) = (placed, of_file);
-                }
+                Ok(placed) => (grid, world) = (placed, of_file),
                 Err(_) => {
                     notes.push("the axes of the file span no space; its orientation is not used".to_owned())
                 }

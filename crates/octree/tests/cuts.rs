@@ -224,7 +224,7 @@ fn random_camera(noise: &mut Noise, extent: DVec3) -> Camera {
     } else {
         Projection::Orthographic { height: extent.length() * (0.05 + noise.unit()) }
     };
-    Camera { eye, target, up, projection }
+    Camera { eye, target, up, projection, is_mirrored: false }
 }
 
 #[test]

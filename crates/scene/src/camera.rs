@@ -28,6 +28,9 @@ pub struct Camera {
     pub up: DVec3,
     /// Perspective or orthographic.
     pub projection: Projection,
+    /// Whether left and right of the picture change sides. So a camera in a mirror image of the world takes the picture
+    /// that it takes of the world.
+    pub is_mirrored: bool,
 }
 
 /// One thing that is wrong with a camera.
@@ -130,12 +133,12 @@ impl Camera {
         defects
     }
 
-    /// Unit vectors `(right, up, forward)` of the picture in world space. Meaningful when
-    /// [`Camera::defects`] finds nothing.
+    /// Unit vectors `(right, up, forward)` of the picture in world space; left-handed where it is mirrored. Meaningful
+    /// when [`Camera::defects`] finds nothing.
     pub fn axes(&self) -> [DVec3; 3] {
         let forward = (self.target - self.eye).normalize();
         let right = forward.cross(self.up).normalize();
-        [right, right.cross(forward), forward]
+        [if self.is_mirrored { -right } else { right }, right.cross(forward), forward]
     }
 
     /// The rays of a picture of `width` by `height` pixels. Meaningful when [`Camera::defects`] finds
@@ -200,7 +203,7 @@ impl Camera {
             Projection::Perspective { fov_y_deg }
         };
         let distance = if orthographic { distance.max(extent.length()) } else { distance };
-        Self { eye: target + toward_eye * distance, target, up, projection }
+        Self { eye: target + toward_eye * distance, target, up, projection, is_mirrored: false }
     }
 }
 
@@ -214,6 +217,7 @@ mod tests {
             target: DVec3::ZERO,
             up: DVec3::Z,
             projection: Projection::Perspective { fov_y_deg: 90.0 },
+            is_mirrored: false,
         }
     }
 

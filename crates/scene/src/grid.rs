@@ -4,6 +4,7 @@ use std::fmt;
 
 use glam::{DAffine3, DVec3};
 
+use crate::placement::{Placement, Sheared};
 use crate::samples::{SampleType, Samples};
 
 /// A regular grid of samples of any size and type.
@@ -17,6 +18,9 @@ pub struct VoxelGrid {
 
 /// Axes of length 1 that span less are taken to lie in a plane.
 const MIN_ORIENTATION_VOLUME: f64 = 1e-9;
+
+/// What is taken for rounding of the length of an axis, as a share of it.
+const MAX_ROUNDING: f64 = 1e-5;
 
 /// One thing that is wrong with a grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,8 +113,8 @@ impl VoxelGrid {
         Ok(Self { dims, spacing, world_from_index: DAffine3::from_scale(spacing), samples })
     }
 
-    /// The same samples, with the place and orientation that their file gives them. What is drawn does not
-    /// change: pictures show a sample at its index times the spacing.
+    /// The same samples, with the place and orientation that their file gives them. Their space does not change:
+    /// see [`VoxelGrid::in_world`].
     ///
     /// # Errors
     /// When the map is not finite or cannot be turned back.
@@ -122,6 +126,23 @@ impl VoxelGrid {
             return Err(Error { defects: vec![Defect::Orientation] });
         }
         Ok(Self { world_from_index, ..self })
+    }
+
+    /// The same samples as far apart as their orientation says, and where that lies in the world.
+    ///
+    /// # Errors
+    /// When the axes of the samples are not at right angles.
+    pub fn in_world(self) -> Result<(Self, Placement), Sheared> {
+        let placement = Placement::of(&self.world_from_index)?;
+        let mut spacing = self.spacing;
+        for axis in 0..3 {
+            let length = self.world_from_index.matrix3.col(axis).length();
+            // What 32 bits do to a direction does not count.
+            if (length - spacing[axis]).abs() > MAX_ROUNDING * length {
+                spacing[axis] = length;
+            }
+        }
+        Ok((Self { spacing, ..self }, placement))
     }
 
     /// Samples along x, y, z; each at least 1.

@@ -4,8 +4,9 @@
 //! Plain data and its validation, in `f64`; every other crate of Volery speaks in these types.
 //!
 //! # Conventions
-//! - *World*: sample `(i, j, k)` of a grid lies at `(i, j, k) * spacing`, the first at the origin. The
+//! - *Space* of a grid: sample `(i, j, k)` lies at `(i, j, k) * spacing`, the first at the origin. The
 //!   domain is the hull of the samples, `[0, (n - 1) * spacing]`; inside, the field is trilinear.
+//! - *World*: what cameras, planes and meshes are in. It is the space of the grid, but for a [`Placement`].
 //! - *Blank*: a sample that is NaN or infinite. A cell with a blank corner holds no matter.
 //! - *Light*: emission and absorption, `I = ∫ c s T dt + T_end * background` with `T = exp(-∫ s)`, where
 //!   `c` is the straight colour and `s` the extinction per world length.
@@ -18,6 +19,7 @@ pub mod camera;
 pub mod grid;
 pub mod history;
 pub mod mesh;
+pub mod placement;
 pub mod plane;
 pub mod quantization;
 pub mod revision;
@@ -30,6 +32,7 @@ pub use camera::{Camera, Projection, Ray, RayGrid};
 pub use grid::VoxelGrid;
 pub use history::History;
 pub use mesh::TriangleMesh;
+pub use placement::Placement;
 pub use plane::Plane;
 pub use quantization::Quantization;
 pub use revision::Revision;

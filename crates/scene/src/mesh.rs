@@ -71,6 +71,13 @@ impl TriangleMesh {
         Ok(Self { revision: Revision::new(), points, triangles, color })
     }
 
+    /// The same triangles with their points elsewhere: other contents.
+    pub(crate) fn moved(&self, to: impl Fn(DVec3) -> DVec3) -> Self {
+        let Self { revision: _, points, triangles, color } = self;
+        let points = points.iter().map(|&point| to(point)).collect();
+        Self { revision: Revision::new(), points, triangles: triangles.clone(), color: *color }
+    }
+
     /// Names the contents, which never change; those of clones are the same.
     pub fn revision(&self) -> Revision {
         self.revision

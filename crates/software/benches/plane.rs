@@ -68,6 +68,7 @@ fn plane(criterion: &mut Criterion) {
         target: middle,
         up: DVec3::Y,
         projection: Projection::Orthographic { height: f64::from(SAMPLES) },
+        is_mirrored: false,
     };
     let mut group = criterion.benchmark_group("oblique plane through 512^3 u8");
     for (name, low_corners) in [("full resolution", 0), ("blended", 0b0101_1010)] {

@@ -50,6 +50,7 @@ fn sheets(criterion: &mut Criterion) {
         target: DVec3::new(-5.0, 5.0, 2.5),
         up: DVec3::Z,
         projection: Projection::Perspective { fov_y_deg: 30.0 },
+        is_mirrored: false,
     };
     let points = [(1.0, 0.0), (4.0, 0.02), (8.0, 0.1), (11.4, 0.4)];
     let points =

@@ -31,6 +31,7 @@ fn picture(points: &[DVec3], cells: &[(CellType, Vec<u32>)], extinction: f32) ->
         target: middle,
         up: DVec3::Z,
         projection: Projection::Orthographic { height: 1.6 },
+        is_mirrored: false,
     };
     // The same planes whatever the cells are.
     let normal = (camera.target - camera.eye).normalize();

@@ -88,7 +88,7 @@ fn strips_for_any_eye_have_the_bits_of_strips_in_order() {
         } else {
             Projection::Perspective { fov_y_deg: 40.0 }
         };
-        let camera = Camera { eye, target, up: DVec3::Z, projection };
+        let camera = Camera { eye, target, up: DVec3::Z, projection, is_mirrored: false };
         let mut oriented = mesh.clone();
         oriented.orient_strips(match projection {
             Projection::Perspective { .. } => Rays::From(eye),

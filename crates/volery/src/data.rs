@@ -5,8 +5,9 @@ mod stack;
 mod volume;
 
 use glam::DVec3;
+use volery_io::World;
 use volery_pyramid::NodeSource;
-use volery_scene::TransferFunction;
+use volery_scene::{Placement, TransferFunction};
 
 use crate::report;
 use crate::technique::Technique;
@@ -31,10 +32,20 @@ pub trait Data: Send + Sized + 'static {
     /// The box around it.
     fn world_bounds(&self) -> [DVec3; 2];
 
-    /// Size of that box.
+    /// Its size.
     fn extent(&self) -> DVec3 {
         let [low, high] = self.world_bounds();
         high - low
+    }
+
+    /// Where the space of its techniques lies in the world.
+    fn placement(&self) -> Placement {
+        Placement::default()
+    }
+
+    /// What the axes of the world mean.
+    fn world(&self) -> World {
+        World::Plain
     }
 
     /// The transfer function of a preset for its values, of colours for their first channel; over a range of values, in

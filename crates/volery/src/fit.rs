@@ -7,11 +7,13 @@
 //! then stands as near as it can with every corner of the other blocks in the picture, and in its middle.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DQuat, DVec2, DVec3};
 use rayon::prelude::*;
-use volery_pyramid::{NodeSource, Pyramid};
-use volery_scene::{Camera, Projection, Samples, TransferFunction, UnstructuredGrid};
+use volery_io::World;
+use volery_pyramid::Layout;
+use volery_scene::{Camera, Placement, Projection, Samples, TransferFunction, UnstructuredGrid, VoxelGrid};
 
 /// Samples looked at, at most.
 pub const MAX_SAMPLES: usize = 1 << 21;
@@ -55,52 +57,196 @@ impl Default for Direction {
 impl Direction {
     /// Straight at planes of this unit normal, from the side of them that is nearer to the default.
     pub fn facing(normal: DVec3) -> Self {
-        let usual = Self::default();
-        let (azimuth, elevation) = (usual.azimuth_deg.to_radians(), usual.elevation_deg.to_radians());
-        let to_eye =
-            DVec3::new(elevation.cos() * azimuth.sin(), -elevation.cos() * azimuth.cos(), elevation.sin());
-        let side = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
-        let azimuth_deg = side.x.atan2(-side.y).to_degrees();
+        let [_, _, forward] = Self::default().turned(DVec3::ONE, DVec3::Z).axes();
+        let side = if normal.dot(forward) > 0.0 { -normal } else { normal };
+        Self::toward_eye(side, DVec3::Z)
+    }
+
+    /// From where a vector points to, of any length but 0, in a picture whose upwards direction is `up`.
+    pub fn toward_eye(to_eye: DVec3, up: DVec3) -> Self {
+        let side = turn_of(up).inverse() * to_eye.normalize_or_zero();
+        let azimuth_deg =
+            if side.truncate() == DVec2::ZERO { 0.0 } else { side.x.atan2(-side.y).to_degrees() };
         Self { azimuth_deg, elevation_deg: side.z.clamp(-1.0, 1.0).asin().to_degrees(), zoom: 1.0 }
+    }
+
+    /// A camera that shows a box from here, for its axes alone. The angles are about `up`: z turned into it on the shortest
+    /// way turns x and y, too.
+    fn turned(self, extent: DVec3, up: DVec3) -> Camera {
+        let Self { azimuth_deg, elevation_deg, .. } = self;
+        let camera = Camera::fitted(extent, azimuth_deg, elevation_deg, 1.0, false);
+        if up == DVec3::Z {
+            return camera;
+        }
+        let turn = turn_of(up);
+        Camera { eye: camera.target + turn * (camera.eye - camera.target), up: turn * camera.up, ..camera }
     }
 }
 
-/// Boxes in world units, `[low, high]`, that hold the visible matter; the whole domain if nothing is visible.
-pub fn visible_blocks(pyramid: &Pyramid, transfer: &TransferFunction) -> Vec<[DVec3; 2]> {
-    let layout = pyramid.layout();
+/// What turns z into a direction on the shortest way; into -z about x.
+fn turn_of(up: DVec3) -> DQuat {
+    let up = up.normalize_or_zero();
+    if up.z < -1.0 + 1e-12 { DQuat::from_rotation_x(PI) } else { DQuat::from_rotation_arc(DVec3::Z, up) }
+}
+
+/// A side that data are seen from. The front of anatomical data is y, that of others -y; the right is x, as a patient has
+/// it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The face of a patient; of other data, where nobody says otherwise, the side of low y.
+    Front,
+    /// The other one.
+    Back,
+    /// Of low x.
+    Left,
+    /// Of high x.
+    Right,
+    /// Of high z.
+    Top,
+    /// Of low z.
+    Bottom,
+    /// The front of a patient.
+    Anterior,
+    /// The back of a patient.
+    Posterior,
+    /// The head of a patient.
+    Superior,
+    /// The feet of a patient.
+    Inferior,
+}
+
+impl Side {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Front,
+        Self::Back,
+        Self::Left,
+        Self::Right,
+        Self::Top,
+        Self::Bottom,
+        Self::Anterior,
+        Self::Posterior,
+        Self::Superior,
+        Self::Inferior,
+    ];
+
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Front => "front",
+            Self::Back => "back",
+            Self::Left => "left",
+            Self::Right => "right",
+            Self::Top => "top",
+            Self::Bottom => "bottom",
+            Self::Anterior => "anterior",
+            Self::Posterior => "posterior",
+            Self::Superior => "superior",
+            Self::Inferior => "inferior",
+        }
+    }
+
+    /// The unit vector of the world from data to an eye on this side; `None` for sides of patients in a world that knows
+    /// none.
+    pub fn to_eye(self, world: World) -> Option<DVec3> {
+        let is_patient = world == World::Anatomical;
+        let front = if is_patient { DVec3::Y } else { -DVec3::Y };
+        match self {
+            Self::Front => Some(front),
+            Self::Back => Some(-front),
+            Self::Left => Some(-DVec3::X),
+            Self::Right => Some(DVec3::X),
+            Self::Top => Some(DVec3::Z),
+            Self::Bottom => Some(-DVec3::Z),
+            Self::Anterior => is_patient.then_some(DVec3::Y),
+            Self::Posterior => is_patient.then_some(-DVec3::Y),
+            Self::Superior => is_patient.then_some(DVec3::Z),
+            Self::Inferior => is_patient.then_some(-DVec3::Z),
+        }
+    }
+}
+
+/// How a camera looks that shows everything.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// From where.
+    pub direction: Direction,
+    /// What is up in the picture: a direction of the world, of any length but 0.
+    pub up: DVec3,
+    /// Whether rays are parallel.
+    pub orthographic: bool,
+    /// Width over height of the picture.
+    pub aspect: f64,
+}
+
+/// Boxes of a grid's space, `[low, high]`, that hold the visible matter; the whole domain if nothing is visible.
+///
+/// Samples are looked at and blocks laid out from the corner that is lowest in the world, along its axes: so the boxes
+/// are the same wherever the file begins.
+pub fn visible_blocks(
+    grid: &VoxelGrid,
+    layout: &Layout,
+    placement: &Placement,
+    transfer: &TransferFunction,
+) -> Vec<[DVec3; 2]> {
     let small = |&level: &u32| layout.level_dims(level).iter().product::<usize>() <= MAX_SAMPLES;
     let level = (0..layout.num_levels()).find(small).unwrap_or(layout.num_levels() - 1);
-    let dims = layout.level_dims(level);
+    let nearest = placement.nearest_axes();
+    // Of space, for each axis of the world.
+    let own: [usize; 3] = std::array::from_fn(|axis| (0..3).find(|&i| nearest[i].0 == axis).unwrap_or(axis));
+    let dims = own.map(|axis| layout.level_dims(level)[axis]);
     // Cells of the level per block; its samples and those of the next block's lower face count.
     let cells = dims.map(|n| (n - 1).div_ceil(MAX_BLOCKS).max(1));
     let num_blocks: [usize; 3] = std::array::from_fn(|axis| (dims[axis] - 1).div_ceil(cells[axis]).max(1));
-    let samples = pyramid.level(level);
+    let (samples, all) = (grid.samples(), grid.dims());
+    // What a sample of the level adds to the place in the grid, along an axis of the world.
+    let place = |axis: usize, at: usize| {
+        let (i, stride) = (own[axis], all[..own[axis]].iter().product::<usize>());
+        let index = (at << level).min(all[i] - 1);
+        stride * if nearest[i].1 { index } else { all[i] - 1 - index }
+    };
     let weigh = |block: usize| {
-        let place = [
+        let number = [
             block % num_blocks[0],
             block / num_blocks[0] % num_blocks[1],
             block / num_blocks[0] / num_blocks[1],
         ];
-        let first: [usize; 3] = std::array::from_fn(|axis| place[axis] * cells[axis]);
+        let first: [usize; 3] = std::array::from_fn(|axis| number[axis] * cells[axis]);
         let last: [usize; 3] = std::array::from_fn(|axis| (first[axis] + cells[axis]).min(dims[axis] - 1));
+        let along_x: Vec<usize> = (first[0]..=last[0]).map(|x| place(0, x)).collect();
         let mut weight = 0.0;
         for z in first[2]..=last[2] {
             for y in first[1]..=last[1] {
-                let row = (z * dims[1] + y) * dims[0];
-                let opacity = |x: usize| {
+                let row = place(1, y) + place(2, z);
+                let opacity = |x: &usize| {
                     let value = samples.value(row + x, 0);
                     if value.is_finite() { transfer.classify(value).1 } else { 0.0 }
                 };
-                weight += (first[0]..=last[0]).map(opacity).sum::<f64>();
+                weight += along_x.iter().map(opacity).sum::<f64>();
             }
         }
-        let step = layout.spacing() * (1_u64 << level) as f64;
-        let corner = |place: [usize; 3]| DVec3::from_array(place.map(|i| i as f64)) * step;
-        let end = layout.domain() * layout.spacing();
-        (weight, [corner(first), corner(last).min(end)])
+        (weight, block_bounds([first, last], level, layout, nearest))
     };
     let blocks = (0..num_blocks.iter().product()).into_par_iter().map(weigh).collect();
     heaviest(blocks).unwrap_or_else(|| vec![[DVec3::ZERO, layout.domain() * layout.spacing()]])
+}
+
+/// The box of space between two samples of a level that are counted along the axes of the world.
+fn block_bounds(
+    [first, last]: [[usize; 3]; 2],
+    level: u32,
+    layout: &Layout,
+    nearest: [(usize, bool); 3],
+) -> [DVec3; 2] {
+    let step = layout.spacing() * (1_u64 << level) as f64;
+    let end = layout.domain() * layout.spacing();
+    let along = |i: usize, counted: [usize; 3]| (counted[nearest[i].0] as f64 * step[i]).min(end[i]);
+    let [low, high] = [first, last].map(|counted| [0, 1, 2].map(|i| along(i, counted)));
+    let is_back = nearest.map(|(_, is_along)| !is_along);
+    let pick = |own: [f64; 3], other: [f64; 3]| {
+        DVec3::from_array([0, 1, 2].map(|i| if is_back[i] { end[i] - other[i] } else { own[i] }))
+    };
+    [pick(low, high), pick(high, low)]
 }
 
 /// Boxes in world units around the visible matter of cells; those of all cells if nothing is visible.
@@ -155,16 +301,15 @@ fn heaviest(mut blocks: Vec<(f64, [DVec3; 2])>) -> Option<Vec<[DVec3; 2]>> {
     (num_light < blocks.len()).then(|| blocks[num_light..].iter().map(|&(_, block)| block).collect())
 }
 
-/// The camera that shows boxes of positive size from a direction, in a picture `aspect` times as wide as high.
-/// Without defects for finite arguments and a positive zoom.
-pub fn camera(boxes: &[[DVec3; 2]], direction: Direction, orthographic: bool, aspect: f64) -> Camera {
+/// The camera that shows boxes of positive size, which lie in a space that is placed so in the world. Without defects
+/// for finite arguments and a positive zoom.
+pub fn camera(boxes: &[[DVec3; 2]], placement: &Placement, look: Look) -> Camera {
     let [low, high] = boxes.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], block| {
         [low.min(block[0]), high.max(block[1])]
     });
-    let Direction { azimuth_deg, elevation_deg, zoom } = direction;
-    // For the axes alone: eye and target are set below.
-    let turned = Camera::fitted(high - low, azimuth_deg, elevation_deg, 1.0, false);
-    let [right, up, forward] = turned.axes();
+    let Look { direction, orthographic, aspect, .. } = look;
+    let turned = direction.turned(high - low, look.up);
+    let [right, up, forward] = turned.axes().map(|axis| placement.direction_to_grid(axis));
     let corners: Vec<DVec3> = boxes
         .iter()
         .flat_map(|block| {
@@ -196,7 +341,8 @@ pub fn camera(boxes: &[[DVec3; 2]], direction: Direction, orthographic: bool, as
         let off = (first + last) / 2.0;
         target += DVec3::new(off.x, off.y, 0.0);
     }
-    let target = right * target.x + up * target.y + forward * target.z;
+    let target = placement.to_world(right * target.x + up * target.y + forward * target.z);
+    let ([_, _, forward], zoom) = (turned.axes(), direction.zoom);
     let projection = if orthographic {
         Projection::Orthographic { height: 2.0 * half_height / zoom }
     } else {
@@ -204,7 +350,7 @@ pub fn camera(boxes: &[[DVec3; 2]], direction: Direction, orthographic: bool, as
     };
     // Parallel rays start before the boxes, whatever the zoom.
     let distance = if orthographic { distance.max((high - low).length()) } else { distance / zoom };
-    Camera { eye: target - forward * distance, target, up: turned.up, projection }
+    Camera { eye: target - forward * distance, target, up: turned.up, projection, is_mirrored: false }
 }
 
 /// A camera of parallel rays along `forward` that just shows all of some points, at least one.
@@ -214,6 +360,7 @@ pub fn facing(points: &[DVec3], forward: DVec3, up: DVec3, aspect: f64) -> Camer
         target: DVec3::ZERO,
         up,
         projection: Projection::Orthographic { height: 1.0 },
+        is_mirrored: false,
     };
     let [right, up, forward] = for_axes.axes();
     let places = points.iter().map(|point| DVec3::new(point.dot(right), point.dot(up), point.dot(forward)));
@@ -223,7 +370,13 @@ pub fn facing(points: &[DVec3], forward: DVec3, up: DVec3, aspect: f64) -> Camer
     let target = right * middle.x + up * middle.y + forward * middle.z;
     let height = size.y.max(size.x / aspect).max(f64::MIN_POSITIVE) / FILL;
     let distance = size.length().max(f64::MIN_POSITIVE);
-    Camera { eye: target - forward * distance, target, up, projection: Projection::Orthographic { height } }
+    Camera {
+        eye: target - forward * distance,
+        target,
+        up,
+        projection: Projection::Orthographic { height },
+        is_mirrored: false,
+    }
 }
 
 /// A camera of parallel rays that shows the plane through the target as large as `camera` does.
@@ -240,7 +393,7 @@ pub fn orthographic(camera: &Camera) -> Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use volery_pyramid::Kind;
+    use volery_pyramid::{Kind, NodeSource, Pyramid};
     use volery_scene::{CellType, Cells, ControlPoint, VoxelGrid};
 
     fn corners_fill_the_picture(bounds: [DVec3; 2], camera: &Camera, aspect: f64) -> f64 {
@@ -261,15 +414,19 @@ mod tests {
         largest
     }
 
+    fn look_at(bounds: [DVec3; 2], direction: Direction, orthographic: bool, aspect: f64) -> Camera {
+        camera(&[bounds], &Placement::default(), Look { direction, up: DVec3::Z, orthographic, aspect })
+    }
+
     #[test]
     fn a_direction_faces_planes_of_any_normal() {
         let bounds = [DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)];
         for normal in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::Z, DVec3::NEG_Z, DVec3::new(0.3, -0.5, 0.81)]
         {
             let normal = normal.normalize();
-            let [_, _, forward] = camera(&[bounds], Direction::facing(normal), true, 1.0).axes();
+            let [_, _, forward] = look_at(bounds, Direction::facing(normal), true, 1.0).axes();
             assert!(normal.dot(forward).abs() > 1.0 - 1e-12, "{normal}: {forward}");
-            let [_, _, usual] = camera(&[bounds], Direction::default(), true, 1.0).axes();
+            let [_, _, usual] = look_at(bounds, Direction::default(), true, 1.0).axes();
             assert!(usual.dot(forward) > 0.0, "{normal}: {forward}");
         }
     }
@@ -281,7 +438,7 @@ mod tests {
             for aspect in [1.0, 2.5, 0.3] {
                 for parallel in [false, true] {
                     let direction = Direction { azimuth_deg, elevation_deg, zoom: 1.0 };
-                    let camera = camera(&[bounds], direction, parallel, aspect);
+                    let camera = look_at(bounds, direction, parallel, aspect);
                     assert!(camera.defects().is_empty());
                     let filled = corners_fill_the_picture(bounds, &camera, aspect);
                     assert!(
@@ -307,7 +464,7 @@ mod tests {
         let pyramid = Pyramid::build(&grid, Kind::Decimated, 8).unwrap();
         let point = |value, opacity| ControlPoint { value, color: [1.0; 3], opacity };
         let transfer = TransferFunction::new(vec![point(50.0, 0.0), point(100.0, 0.5)], 1.0).unwrap();
-        let blocks = visible_blocks(&pyramid, &transfer);
+        let blocks = visible_blocks(&grid, pyramid.layout(), &Placement::default(), &transfer);
         let [low, high] = blocks.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], block| {
             [low.min(block[0]), high.max(block[1])]
         });
@@ -315,7 +472,10 @@ mod tests {
         assert!(low.cmple(first).all() && high.cmpge(last).all(), "{low} {high}");
         assert!((first - low).max_element() <= 4.0 && (high - last).max_element() <= 4.0, "{low} {high}");
         let clear = TransferFunction::new(vec![point(0.0, 0.0)], 1.0).unwrap();
-        assert_eq!(visible_blocks(&pyramid, &clear), [[DVec3::ZERO, grid.extent()]]);
+        assert_eq!(
+            visible_blocks(&grid, pyramid.layout(), &Placement::default(), &clear),
+            [[DVec3::ZERO, grid.extent()]]
+        );
     }
 
     #[test]
@@ -349,7 +509,7 @@ mod tests {
     #[test]
     fn an_orthographic_twin_is_as_large_at_the_target() {
         let bounds = [DVec3::ZERO, DVec3::ONE];
-        let perspective = camera(&[bounds], Direction::default(), false, 1.0);
+        let perspective = look_at(bounds, Direction::default(), false, 1.0);
         let Projection::Orthographic { height } = orthographic(&perspective).projection else {
             panic!("not orthographic");
         };

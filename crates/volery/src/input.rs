@@ -5,11 +5,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use volery_io::mesh::MAX_MESH_BYTES;
-use volery_io::scene_file::{InputKind, SceneError, SceneInput, SceneMesh};
+use volery_io::scene_file::{InputKind, SceneError, SceneInput, SceneMesh, SceneOrientation};
 use volery_io::{Format, GridFile, OpenedFile, ReadError, SceneFile, Volume};
 use volery_io::{is_grid, read_grid, read_mesh, read_stack, read_volume, recording_files};
 use volery_scene::TriangleMesh;
 use volery_slicing::QuantizedMesh;
+
+use crate::data::{VolumeData, VolumeError};
 
 /// Memory that a stack may need: 64 GiB.
 const MAX_STACK_BYTES: u64 = 64 << 30;
@@ -23,6 +25,8 @@ pub struct Input {
     pub data: InputData,
     /// What the scene file says.
     pub scene: Option<SceneFile>,
+    /// Where samples are; of a file without a scene where it says.
+    pub orientation: SceneOrientation,
     /// The opaque surfaces of the scene, for [`View::meshes`](crate::View::meshes).
     pub meshes: Arc<[TriangleMesh]>,
     /// Every file that was opened for it.
@@ -69,6 +73,14 @@ pub enum InputError {
         path: PathBuf,
         /// What it is.
         found: &'static str,
+    },
+    /// Samples cannot be drawn.
+    #[error("{}: {problem}", .path.display().to_string().escape_debug())]
+    Volume {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        problem: VolumeError,
     },
     /// The file has nothing that the option could choose or change.
     #[error("{}: is {found}, expected {expected} for {option}", .path.display().to_string().escape_debug())]
@@ -130,13 +142,15 @@ impl InputOptions {
         }
         let scene = SceneFile::read(path)?;
         let folder = self.data_dir.as_deref().unwrap_or_else(|| path.parent().unwrap_or(Path::new("")));
-        let SceneInput { kind, file, dims, dtype, spacing, array, channel, time_step } = scene.input.clone();
+        let SceneInput { kind, file, dims, dtype, spacing, orientation, array, channel, time_step } =
+            scene.input.clone();
         let input = SceneInput {
             kind: own.kind.or(kind),
             file: folder.join(file),
             dims: own.dims.or(dims),
             dtype: own.dtype.or(dtype),
             spacing: own.spacing.or(spacing),
+            orientation: own.orientation.or(orientation),
             array: own.array.or(array),
             channel: own.channel.or(channel),
             time_step: own.time_step.or(time_step),
@@ -152,6 +166,12 @@ impl InputPlan {
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         let meshes = self.meshes.iter().map(|mesh| mesh.file.as_path());
         self.scene_path.iter().map(PathBuf::as_path).chain([self.input.file.as_path()]).chain(meshes)
+    }
+
+    /// Where samples are. Scenes are older than orientation, and other programs draw them: they have to ask for it.
+    fn orientation(&self) -> SceneOrientation {
+        let usual = if self.scene.is_some() { SceneOrientation::Index } else { SceneOrientation::File };
+        self.input.orientation.unwrap_or(usual)
     }
 
     /// Reads the data.
@@ -171,7 +191,9 @@ impl InputPlan {
             files.insert(0, OpenedFile { path: scene.clone(), bytes });
         }
         let (path, scene) = (self.input.file.clone(), self.scene.clone());
-        Ok(Input { path, data, scene, meshes, files, load_seconds: start.elapsed().as_secs_f64() })
+        let orientation = self.orientation();
+        let load_seconds = start.elapsed().as_secs_f64();
+        Ok(Input { path, data, scene, orientation, meshes, files, load_seconds })
     }
 
     fn read_data(&self, mesh_notes: Vec<String>) -> Result<InputData, InputError> {
@@ -201,7 +223,7 @@ impl InputPlan {
         }
         if volume.format == Format::Raw {
             self.refuse_unread(
-                &["--dims", "--dtype", "--spacing"],
+                &["--dims", "--dtype", "--spacing", "--orientation"],
                 "a raw file, which holds one volume of numbers",
             )?;
         }
@@ -211,11 +233,13 @@ impl InputPlan {
 
     /// Refuses options but for those that such a file reads.
     fn refuse_unread(&self, read: &[&str], found: &str) -> Result<(), InputError> {
-        let SceneInput { kind: _, file: _, dims, dtype, spacing, array, channel, time_step } = &self.input;
+        let SceneInput { kind: _, file: _, dims, dtype, spacing, orientation, array, channel, time_step } =
+            &self.input;
         let given = [
             ("--dims", dims.is_some(), "a volume"),
             ("--dtype", dtype.is_some(), "a volume"),
             ("--spacing", spacing.is_some(), "a volume"),
+            ("--orientation", orientation.is_some(), "a volume"),
             ("--array", array.is_some(), "a file whose format names arrays"),
             ("--channel", channel.is_some(), "a file whose format knows several"),
             ("--time-step", time_step.is_some(), "a file whose format knows several"),
@@ -260,12 +284,30 @@ impl Input {
         }
     }
 
-    /// What the reader decided, a sentence each.
-    pub fn notes(&self) -> &[String] {
+    /// The samples, made ready to be drawn where they are.
+    ///
+    /// # Errors
+    /// When there are none, or they cannot be drawn.
+    pub fn volume_data(&self) -> Result<VolumeData, InputError> {
+        let volume = self.volume()?;
+        let grid = volume.grid.clone();
+        let data = match self.orientation {
+            SceneOrientation::File => VolumeData::in_world(grid, volume.world),
+            SceneOrientation::Index => VolumeData::new(grid),
+        };
+        data.map_err(|problem| InputError::Volume { path: self.path.clone(), problem })
+    }
+
+    /// What the reader decided, a sentence each, and where the picture is turned against the file.
+    pub fn notes(&self) -> Vec<String> {
         match &self.data {
-            InputData::Volume(volume) => &volume.notes,
-            InputData::Grid(file) => &file.notes,
-            InputData::Stack(_) => &[],
+            InputData::Volume(volume) => {
+                let is_by_index = self.orientation == SceneOrientation::Index;
+                let turned = is_by_index.then(|| volume.orientation().note()).flatten();
+                volume.notes.iter().cloned().chain(turned).collect()
+            }
+            InputData::Grid(file) => file.notes.clone(),
+            InputData::Stack(_) => Vec::new(),
         }
     }
 }

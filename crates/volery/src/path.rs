@@ -81,6 +81,7 @@ mod tests {
             target: DVec3::new(1.0, 2.0, 0.5),
             up: DVec3::Z,
             projection: Projection::Perspective { fov_y_deg: 30.0 },
+            is_mirrored: false,
         };
         let distance =
             |camera: &Camera| (camera.eye - camera.target).length() / (start.eye - start.target).length();

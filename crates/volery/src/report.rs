@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use glam::DAffine3;
 use serde::Serialize;
 use volery_frame::{Device, DeviceKind};
-use volery_io::scene_file::{SceneTransfer, serialize_camera, serialize_transfer};
-use volery_io::{OpenedFile, Volume, World};
+use volery_io::scene_file::{SceneOrientation, SceneTransfer, serialize_camera, serialize_transfer};
+use volery_io::{OpenedFile, World};
 use volery_scene::Camera;
 
 use crate::view::{Transfer, View};
@@ -75,7 +75,7 @@ pub struct Input {
     pub place: Option<Place>,
 }
 
-/// Where samples lie in the world of their file. Pictures are drawn along the axes of the samples.
+/// Where samples lie in the world of their file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Place {
     /// Which way the axes of the samples run, as `LPS` or `+x -y +z`.
@@ -83,11 +83,14 @@ pub struct Place {
     /// From the index of a sample to its place: three rows, each of the factors of x, y, z and what is added. Of
     /// anatomical files the world runs to the right, to the front and to the head.
     pub world_from_index: [[f64; 4]; 3],
+    /// The world that the camera is in: `file`, that of the file, or `index`, where samples are at index times spacing.
+    pub drawn_by: &'static str,
 }
 
 impl Place {
-    /// That of a volume; `None` if its file says no more than distances.
-    pub fn of(volume: &Volume) -> Option<Self> {
+    /// That of a volume; `None` for other data, and if its file says no more than distances.
+    pub fn of(input: &crate::Input) -> Option<Self> {
+        let volume = input.volume().ok()?;
         let world_from_index = volume.grid.world_from_index();
         let is_plain = world_from_index == DAffine3::from_scale(volume.grid.spacing());
         let (matrix, origin) = (world_from_index.matrix3, world_from_index.translation);
@@ -95,6 +98,10 @@ impl Place {
         let place = || Self {
             orientation: volume.orientation().to_string(),
             world_from_index: [row(0), row(1), row(2)],
+            drawn_by: match input.orientation {
+                SceneOrientation::File => "file",
+                SceneOrientation::Index => "index",
+            },
         };
         (volume.world == World::Anatomical || !is_plain).then(place)
     }

@@ -7,8 +7,10 @@
 mod deadline;
 mod error;
 mod refine;
+mod space;
 mod times;
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -24,6 +26,7 @@ use crate::residency::{self, Uploaded};
 use crate::technique::{Drawing, Plan, Technique, Work};
 use crate::transfer::Preset;
 use crate::view::{Dial, How, View, ViewOptions};
+use space::Space;
 
 pub use error::{RenderError, VerifyError};
 pub use refine::Refinements;
@@ -45,13 +48,14 @@ pub struct Session<D> {
     techniques: Vec<(Box<dyn Technique<D>>, Option<f64>)>,
     /// What was learned by pictures with deadlines.
     pace: Option<deadline::Pace>,
+    space: Space,
 }
 
 impl<D: Data> Session<D> {
     /// Of data that are ready.
     pub fn new(data: D) -> Self {
         let techniques = D::techniques().into_iter().map(|technique| (technique, None)).collect();
-        Self { data, techniques, pace: None }
+        Self { data, techniques, pace: None, space: Space::default() }
     }
 
     /// What is drawn.
@@ -110,6 +114,7 @@ impl<D: Data> Session<D> {
         backend: &mut dyn Backend,
     ) -> Result<Picture, RenderError> {
         let place = self.check(view)?;
+        let local = &*self.local(view);
         if self.techniques[place].1.is_none() {
             let start = Instant::now();
             self.techniques[place].0.prepare(&self.data);
@@ -124,7 +129,7 @@ impl<D: Data> Session<D> {
             drop(last.take());
             if let Dial::Deadline(deadline) = view.dial {
                 let start = Instant::now();
-                let paced = self.draw_by(view, deadline, place, backend)?;
+                let paced = self.draw_by(local, deadline, place, backend)?;
                 uploaded += paced.uploaded;
                 let (select, upload) = (paced.select_secs, paced.upload_secs);
                 times.push(Times {
@@ -143,14 +148,14 @@ impl<D: Data> Session<D> {
                 technique.forget_view();
             }
             let start = Instant::now();
-            let plan = technique.plan(&mut self.data, view)?;
+            let plan = technique.plan(&mut self.data, local)?;
             let geometry = plan.geometry_seconds;
             let select = start.elapsed().as_secs_f64() - geometry.unwrap_or(0.0);
             let start = Instant::now();
             uploaded += self.upload(&plan, backend)?;
             let upload = plan.store.is_some().then(|| start.elapsed().as_secs_f64());
             let start = Instant::now();
-            let drawn = self.draw(view, &plan, backend)?;
+            let drawn = self.draw(local, &plan, backend)?;
             times.push(Times { select, geometry, upload, draw: start.elapsed().as_secs_f64(), paced: None });
             last = Some((plan, drawn));
         }
@@ -175,7 +180,8 @@ impl<D: Data> Session<D> {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<volery_reference::Image, VerifyError> {
         let (technique, _) = &self.techniques[self.check(view).map_err(Box::new)?];
-        let truth = technique.truth(&self.data, view, progress)?;
+        let local = Space::default().view(&self.data.placement(), view);
+        let truth = technique.truth(&self.data, &local, progress)?;
         picture.measure(&truth)?;
         Ok(truth)
     }
@@ -187,7 +193,8 @@ impl<D: Data> Session<D> {
     /// When the technique has no such bounds, or bricks cannot be read.
     pub fn certify(&mut self, view: &View, picture: &mut Picture) -> Result<MatterBound, RenderError> {
         let place = self.check(view)?;
-        let bound = self.techniques[place].0.bound(&mut self.data, view)?.ok_or(RenderError::NoBound {
+        let local = self.local(view);
+        let bound = self.techniques[place].0.bound(&mut self.data, &local)?.ok_or(RenderError::NoBound {
             technique: view.how.name(),
             has_deadline: matches!(view.dial, Dial::Deadline(_)),
         })?;
@@ -196,6 +203,11 @@ impl<D: Data> Session<D> {
         error.bound_rms = Some(bound.rms());
         error.bound_against = Some(report::AGAINST_EXACT);
         Ok(bound)
+    }
+
+    /// A view in the space of the data, which techniques and backends know alone.
+    pub(crate) fn local<'v>(&mut self, view: &'v View) -> Cow<'v, View> {
+        self.space.view(&self.data.placement(), view)
     }
 
     /// The place of the technique of a view that can be drawn.

@@ -143,8 +143,11 @@ pub struct ViewOptions {
     pub width: u32,
     /// Pixels from top to bottom.
     pub height: u32,
-    /// From where to look; if missing, straight at a single plane, else the default direction.
+    /// From where to look; if missing, straight at a single plane, else from the front of what is anatomical, or the
+    /// default direction.
     pub direction: Option<fit::Direction>,
+    /// A direction of the world that is up in the picture; if missing, z.
+    pub up: Option<DVec3>,
     /// Whether rays are parallel.
     pub orthographic: bool,
     /// If missing [`Preset::Auto`](crate::Preset::Auto) for matter, grey from black to white over the range of values
@@ -162,6 +165,7 @@ impl Default for ViewOptions {
             width: 768,
             height: 768,
             direction: None,
+            up: None,
             orthographic: false,
             transfer: None,
             range: None,
@@ -174,6 +178,16 @@ impl ViewOptions {
     /// Width over height.
     pub(crate) fn aspect(&self) -> f64 {
         f64::from(self.width.max(1)) / f64::from(self.height.max(1))
+    }
+
+    /// How to look, from a direction unless the options have another.
+    pub(crate) fn look(&self, direction: fit::Direction) -> fit::Look {
+        fit::Look {
+            direction: self.direction.unwrap_or(direction),
+            up: self.up.unwrap_or(DVec3::Z),
+            orthographic: self.orthographic,
+            aspect: self.aspect(),
+        }
     }
 
     /// Transfer function of the options, else another.

@@ -103,6 +103,7 @@ fn draw(criterion: &mut Criterion) {
         target: DVec3::ZERO,
         up: DVec3::Y,
         projection: Projection::Perspective { fov_y_deg: 30.0 },
+        is_mirrored: false,
     };
     let mut group = criterion.benchmark_group("sheets");
     group.sample_size(10).throughput(Throughput::Elements(stack.triangles.len() as u64));

@@ -58,7 +58,13 @@ fn looking(
     projection: Projection,
 ) -> Camera {
     loop {
-        let camera = Camera { eye, target: target(random.direction()), up: random.direction(), projection };
+        let camera = Camera {
+            eye,
+            target: target(random.direction()),
+            up: random.direction(),
+            projection,
+            is_mirrored: false,
+        };
         if camera.defects().is_empty() && camera.axes().iter().all(|axis| axis.is_finite()) {
             return camera;
         }
@@ -86,5 +92,11 @@ fn on_faces(random: &mut Random, extent: DVec3, spacing: DVec3, [width, height]:
     let away = spacing[forward_axis] * 2.0;
     eye[forward_axis] = if forward[forward_axis] > 0.0 { -away } else { extent[forward_axis] + away };
     let target = eye + forward * spacing[forward_axis];
-    Camera { eye, target, up, projection: Projection::Orthographic { height: step * f64::from(height) } }
+    Camera {
+        eye,
+        target,
+        up,
+        projection: Projection::Orthographic { height: step * f64::from(height) },
+        is_mirrored: false,
+    }
 }

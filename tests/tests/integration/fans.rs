@@ -144,7 +144,13 @@ fn is_the_integral(
 }
 
 fn perspective(eye: DVec3, target: DVec3, fov_y_deg: f64) -> Camera {
-    Camera { eye, target, up: DVec3::Z, projection: Projection::Perspective { fov_y_deg } }
+    Camera {
+        eye,
+        target,
+        up: DVec3::Z,
+        projection: Projection::Perspective { fov_y_deg },
+        is_mirrored: false,
+    }
 }
 
 fn engine_is_the_integral_of_its_cubes(choice: BackendChoice, test: &str) {

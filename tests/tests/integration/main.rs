@@ -30,6 +30,7 @@ mod grids;
 mod grids_peers;
 mod meshes;
 mod opacity;
+mod orientation;
 mod peers;
 mod planes;
 mod rays;

@@ -6,8 +6,9 @@ use volery::{Image, Input, InputData, View, VoxelGrid};
 /// Rays along each side of the picture that look for the data.
 const RAYS: u32 = 64;
 
-/// Why a picture shows nothing but its background; `None` for one that shows something.
-pub(super) fn reason(image: &Image, view: &View, input: &Input) -> Option<String> {
+/// Why a picture shows nothing but its background; `None` for one that shows something. `bounds` is the box around the
+/// data in the world.
+pub(super) fn reason(image: &Image, view: &View, input: &Input, bounds: [DVec3; 2]) -> Option<String> {
     let background = view.background.map(|channel| channel as f32);
     if image.pixels.iter().any(|pixel| *pixel != background) {
         return None;
@@ -16,7 +17,7 @@ pub(super) fn reason(image: &Image, view: &View, input: &Input) -> Option<String
         InputData::Volume(volume) if !has_whole_cell(&volume.grid) => {
             return Some("every cell of the volume has a blank sample at a corner".to_owned());
         }
-        InputData::Volume(volume) => Some([DVec3::ZERO, volume.grid.extent()]),
+        InputData::Volume(_) => Some(bounds),
         InputData::Grid(file) => file.grid.world_bounds(),
         InputData::Stack(_) => None,
     };

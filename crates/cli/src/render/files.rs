@@ -92,16 +92,17 @@ pub(super) fn finish<D: Data>(
     Files { input: &input.path, outputs, error_map, report }.write(&mut picture, verify)?;
     bounds.map_or(Ok(()), say)?;
     if let Some(path) = &args.save_scene {
-        save::save_scene(path, wanted, view, session.data().has_colors())?;
+        let orientation = Place::of(input).map(|_| input.orientation);
+        save::save_scene(path, wanted, view, (orientation, session.data().has_colors()))?;
     }
-    notes(input.notes(), session, view)?;
+    notes(&input.notes(), session, view)?;
     if let Some([low, high]) = wanted::window(args, wanted, input, session) {
         let [low, high] = [low, high].map(number);
         say(format_args!(
             "note: colours run over the values that the file asks to show, {low} to {high} (--range for others)"
         ))?;
     }
-    match empty::reason(&picture.image, view, input) {
+    match empty::reason(&picture.image, view, input, session.data().world_bounds()) {
         None => Ok(()),
         Some(reason) => say(format_args!("note: nothing is seen: {reason}")),
     }
@@ -110,7 +111,7 @@ pub(super) fn finish<D: Data>(
 /// Says in a report what was read.
 pub(super) fn name_sources(report: &mut Report, input: &Input) {
     report.input.path = Some(input.path.to_string_lossy().into_owned());
-    report.input.place = input.volume().ok().and_then(Place::of);
+    report.input.place = Place::of(input);
     report.inputs = input.files.iter().map(InputFile::from).collect();
     report.seconds.load = Some(input.load_seconds);
 }

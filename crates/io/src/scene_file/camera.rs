@@ -58,7 +58,7 @@ impl CameraJson {
             }
         };
         let [eye, target, up] = [self.eye, self.target, self.up].map(DVec3::from_array);
-        let camera = Camera { eye, target, up, projection };
+        let camera = Camera { eye, target, up, projection, is_mirrored: false };
         match camera.defects().into_iter().next() {
             None => Ok(camera),
             Some(defect) => Err(defect.to_string()),

@@ -141,13 +141,15 @@ impl Fields<'_> {
     }
 }
 
-/// Says so where the distances by `pixdim`, which pictures show, are not those of `sform`.
+/// Says so where the distances by `pixdim`, which are those along the axes of the samples, are not those of `sform`.
 fn note_lengths(axes: DMat3, pixdim: [f64; 4], notes: &mut Vec<String>) {
     let lengths = [0, 1, 2].map(|i| axes.col(i).length());
     let differs = |i: usize| (lengths[i] - pixdim[i + 1].abs()).abs() > 1e-3 * pixdim[i + 1].abs();
     if (0..3).any(differs) {
-        let [x, y, z] = lengths;
-        notes.push(format!("the axes of sform have lengths {x} x {y} x {z}; pixdim is used"));
+        let ([x, y, z], [_, i, j, k]) = (lengths, pixdim.map(f64::abs));
+        notes.push(format!(
+            "voxels are {x} x {y} x {z} by sform, as the world has them, and {i} x {j} x {k} by pixdim"
+        ));
     }
 }
 

@@ -21,12 +21,12 @@ fn assert_places(volume: &Volume, first: [f64; 3], steps: [[f64; 3]; 3]) {
 
 #[track_caller]
 fn assert_note(volume: &Volume, expected: Option<&str>) {
-    let found: Vec<_> =
-        volume.notes.iter().filter(|note| note.starts_with("the axes of the samples")).collect();
+    let found = volume.orientation().note();
     match expected {
-        None => assert!(found.is_empty(), "{found:?}"),
+        None => assert_eq!(found, None),
         Some(expected) => {
-            assert!(found.len() == 1 && found[0].contains(expected), "{found:?}, expected {expected}")
+            let found = found.unwrap_or_default();
+            assert!(found.contains(expected), "{found:?}, expected {expected}");
         }
     }
 }
@@ -68,7 +68,7 @@ fn nifti_by_sform_then_qform_then_nothing() {
     let turned = [(264, 0.5_f32.sqrt()), (268, 1.0), (272, 2.0), (276, 3.0)];
     let volume = folder.read("a.nii", nifti(qform, &turned));
     assert_places(&volume, [1.0, 2.0, 3.0], [[0.0, 1.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, 0.5]]);
-    assert_note(&volume, Some("run to ALS; pictures are drawn along them, and so turned against"));
+    assert_note(&volume, Some("run to ALS; the picture is drawn along them, and so turned against"));
     // A negative factor turns the third axis back.
     let mirrored = [&turned[..], &[(76, -1.0)]].concat();
     let volume = folder.read("a.nii", nifti(qform, &mirrored));
@@ -86,7 +86,10 @@ fn nifti_by_sform_then_qform_then_nothing() {
     );
     let longer = rows([3.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0]);
     let volume = folder.read("a.nii", nifti(sform, &longer));
-    assert_eq!(volume.notes, ["the axes of sform have lengths 3 x 2 x 0.5; pixdim is used"]);
+    assert_eq!(
+        volume.notes,
+        ["voxels are 3 x 2 x 0.5 by sform, as the world has them, and 1 x 2 x 0.5 by pixdim"]
+    );
 }
 
 #[test]
@@ -178,7 +181,7 @@ fn vti_by_direction_origin_and_extent() {
     let attributes = "Origin=\"1 2 3\" Spacing=\"1 2 4\" Direction=\"0 1 0 1 0 0 0 0 1\"";
     let volume = read(attributes, "PointData");
     assert_places(&volume, [1.0, 7.0, 7.0], [[0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 4.0]]);
-    assert_note(&volume, Some("run to +y +x +z; pictures are drawn along them, and so mirrored"));
+    assert_note(&volume, Some("run to +y +x +z; the picture is drawn along them, and so mirrored"));
     // The centre of the first cell.
     let cells = read(attributes, "CellData");
     assert_places(&cells, [2.0, 7.5, 9.0], [[0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 4.0]]);

@@ -13,7 +13,7 @@ pub(crate) fn transfer(points: &[(f64, [f64; 3], f64)], unit_distance: f64) -> T
 
 pub(crate) fn perspective(eye: DVec3, target: DVec3, fov_y_deg: f64) -> Camera {
     let up = if (target - eye).normalize().z.abs() > 0.99 { DVec3::Y } else { DVec3::Z };
-    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg } }
+    Camera { eye, target, up, projection: Projection::Perspective { fov_y_deg }, is_mirrored: false }
 }
 
 pub(crate) fn orthographic(eye: DVec3, target: DVec3, height: f64) -> Camera {

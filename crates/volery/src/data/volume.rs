@@ -4,10 +4,13 @@ use std::time::Instant;
 
 use glam::DVec3;
 use volery_frame::{Revision, VolumeLayout};
+use volery_io::World;
 use volery_pyramid::{Kind, NodeSource, Pyramid};
-use volery_scene::{SampleType, TransferFunction, VoxelGrid};
+use volery_scene::placement::Sheared;
+use volery_scene::{Placement, SampleType, TransferFunction, VoxelGrid};
 
 use super::Data;
+use crate::fit::Direction;
 use crate::report;
 use crate::residency::Store;
 use crate::session::RenderError;
@@ -28,6 +31,8 @@ pub const BRICK_CELLS: usize = 32;
 /// A volume with its pyramid.
 pub struct VolumeData {
     grid: VoxelGrid,
+    placement: Placement,
+    world: World,
     pyramid: Pyramid,
     store: Store,
     /// What makes bounds of planes tight, once an error was asked for.
@@ -47,13 +52,26 @@ pub enum VolumeError {
         /// Smallest and largest value.
         range: [f64; 2],
     },
+    /// The world of the file is no turn of the samples.
+    #[error("{0} (by index, samples lie along axes of their own)")]
+    Sheared(#[from] Sheared),
     /// The pyramid cannot be built.
     #[error("pyramid: {0}")]
     Layout(#[from] volery_pyramid::layout::Error),
 }
 
 impl VolumeData {
-    /// Builds the pyramid of a volume: one walk over the samples.
+    /// A volume in the world of its file: samples are where [`VoxelGrid::world_from_index`] says.
+    ///
+    /// # Errors
+    /// As [`VolumeData::new`], and when the axes of the samples are not at right angles.
+    pub fn in_world(grid: VoxelGrid, world: World) -> Result<Self, VolumeError> {
+        let (grid, placement) = grid.in_world()?;
+        Ok(Self { placement, world, ..Self::new(grid)? })
+    }
+
+    /// Builds the pyramid of a volume: one walk over the samples. The first is at the origin of the world, the others at
+    /// their index times the spacing, whatever the orientation.
     ///
     /// # Errors
     /// When there is no finite sample, or an axis is too long.
@@ -82,7 +100,15 @@ impl VolumeData {
         };
         let store = Store { layout, encoding };
         let parts = std::sync::OnceLock::new();
-        Ok(Self { grid, pyramid, store, parts, build_seconds: start.elapsed().as_secs_f64() })
+        Ok(Self {
+            grid,
+            placement: Placement::default(),
+            world: World::Plain,
+            pyramid,
+            store,
+            parts,
+            build_seconds: start.elapsed().as_secs_f64(),
+        })
     }
 
     /// The samples.
@@ -90,8 +116,17 @@ impl VolumeData {
         &self.grid
     }
 
-    pub(crate) fn pyramid(&self) -> &Pyramid {
-        &self.pyramid
+    /// The middle of the samples in the world.
+    pub fn middle(&self) -> DVec3 {
+        self.placement.to_world(self.grid.extent() / 2.0)
+    }
+
+    /// From where matter is seen where nobody says: from the front, as radiologists look, of what is anatomical.
+    pub(crate) fn usual_direction(&self) -> Direction {
+        match self.world {
+            World::Anatomical => Direction { azimuth_deg: 180.0, elevation_deg: 0.0, zoom: 1.0 },
+            World::Plain => Direction::default(),
+        }
     }
 
     pub(crate) fn source(&self) -> &dyn NodeSource {
@@ -164,9 +199,22 @@ impl Data for VolumeData {
         self.store.layout.value_range
     }
 
-    /// Of the samples: the first is at the origin.
+    /// Of the samples.
     fn world_bounds(&self) -> [DVec3; 2] {
-        [DVec3::ZERO, self.grid.extent()]
+        self.placement.bounds_to_world([DVec3::ZERO, self.grid.extent()])
+    }
+
+    /// Along the axes of the samples.
+    fn extent(&self) -> DVec3 {
+        self.grid.extent()
+    }
+
+    fn placement(&self) -> Placement {
+        self.placement
+    }
+
+    fn world(&self) -> World {
+        self.world
     }
 
     /// # Panics

@@ -107,6 +107,7 @@ fn scene(seed: u64) -> Scene {
         eye: 0.5 * size - distance * direction,
         target: 0.5 * size + direction,
         up: DVec3::Y,
+        is_mirrored: random.next() < 0.2,
         projection,
     };
     let background = [0; 3].map(|_| random.next());

@@ -22,13 +22,14 @@
 
 use glam::DVec3;
 use volery_frame::{BlendedBrick, PointTransfer, Revision, Sampling};
+use volery_io::World;
 use volery_octree::{
     Answer, Cut, CuttingPlanes, Filter, Focus, Frustum, IndexPlane, balance, certified, low_corners, section,
     select, without_unseen,
 };
-use volery_pyramid::{Layout, Node};
+use volery_pyramid::Node;
 use volery_reference::PlaneScene;
-use volery_scene::{Camera, Plane, TransferFunction, VoxelGrid};
+use volery_scene::{Camera, Plane, TransferFunction};
 
 mod bounds;
 mod cells;
@@ -143,7 +144,7 @@ impl Technique<VolumeData> for Planes {
     fn view(&self, volume: &VolumeData, options: &ViewOptions, how: How) -> View {
         let How::Planes(mut planes) = how else { return super::raycast::matter_view(volume, options, how) };
         if planes.planes.is_empty() {
-            planes.planes = middle_planes(volume.grid());
+            planes.planes = middle_planes(volume);
         }
         let shown = || {
             let matter =
@@ -151,9 +152,7 @@ impl Technique<VolumeData> for Planes {
             options.range.unwrap_or(matter.map_or(volume.value_range(), |histogram| histogram.range))
         };
         let transfer = options.transfer_or(|| transfer::gray(shown(), volume.extent()));
-        let (layout, direction) = (volume.source().layout(), options.direction);
-        let camera = camera(layout, &planes.planes, direction, options.orthographic, options.aspect());
-        options.view(camera, transfer, How::Planes(planes))
+        options.view(camera(volume, &planes.planes, options), transfer, How::Planes(planes))
     }
 
     fn check(&self, _: &VolumeData, view: &View) -> Result<(), RenderError> {
@@ -250,39 +249,52 @@ pub(super) fn mix(own: f64, low: f64, ratio: f64) -> f64 {
     }
 }
 
-/// The plane that a flat grid is, or the three through the middle of a volume.
-pub fn middle_planes(grid: &VoxelGrid) -> Vec<Plane> {
-    let middle = grid.extent() / 2.0;
-    let dims = grid.dims();
-    let all = [DVec3::X, DVec3::Y, DVec3::Z];
+/// The plane that a flat grid is, or the three through the middle of a volume, along the axes of the world.
+fn middle_planes(volume: &VolumeData) -> Vec<Plane> {
+    let (placement, dims) = (volume.placement(), volume.grid().dims());
     match (0..3).find(|&axis| dims[axis] == 1) {
-        Some(axis) => vec![Plane::through(DVec3::ZERO, all[axis])],
-        None => all.map(|normal| Plane::through(middle, normal)).to_vec(),
+        Some(axis) => {
+            let normal = placement.direction_to_world(DVec3::AXES[axis]);
+            let is_against = volume.world() == World::Anatomical && normal.dot(RADIOLOGICAL) < 0.0;
+            vec![Plane::through(placement.to_world(DVec3::ZERO), if is_against { -normal } else { normal })]
+        }
+        None => DVec3::AXES.map(|normal| Plane::through(volume.middle(), normal)).to_vec(),
     }
 }
 
-/// A camera that shows planes: from a direction if there is one or if there are several planes, else straight at
-/// the only one. An image stands upright then, its first row at the top.
-pub fn camera(
-    layout: &Layout,
-    planes: &[Plane],
-    direction: Option<fit::Direction>,
-    orthographic: bool,
-    aspect: f64,
-) -> Camera {
+/// The sides that radiologists see slices from: the left, the front, the feet.
+const RADIOLOGICAL: DVec3 = DVec3::new(-1.0, 1.0, -1.0);
+
+/// From where several planes of anatomical data are seen: from the front, so that each shows.
+const ANATOMICAL_PLANES: fit::Direction =
+    fit::Direction { azimuth_deg: 145.0, elevation_deg: 22.0, zoom: 1.0 };
+
+/// A camera that shows planes of the world: from a direction if there is one or if there are several planes, else straight
+/// at the only one, from the side that its normal points to. An image has x to the right and y downwards then, as its file
+/// has them.
+fn camera(volume: &VolumeData, planes: &[Plane], options: &ViewOptions) -> Camera {
+    let (layout, placement) = (volume.source().layout(), volume.placement());
+    let is_anatomical = volume.world() == World::Anatomical;
     let root = layout.root();
-    if let ([plane], None) = (planes, direction) {
-        let section = section(layout, root, &IndexPlane::new(layout, plane));
-        let points: Vec<_> = section.vertices().iter().map(|&vertex| vertex * layout.spacing()).collect();
+    if let ([plane], None) = (planes, options.direction) {
+        let in_grid = IndexPlane::new(layout, &placement.plane_to_grid(plane));
+        let section = section(layout, root, &in_grid);
+        let world = |&vertex: &DVec3| placement.to_world(vertex * layout.spacing());
+        let points: Vec<_> = section.vertices().iter().map(world).collect();
         if !points.is_empty() {
             let normal = plane.normalized().normal;
-            let (forward, up) = match (layout.dims()[2] == 1, normal.z.abs() > 0.9) {
-                (true, _) => (DVec3::Z, -DVec3::Y),
-                (false, true) => (-normal, DVec3::Y),
-                (false, false) => (-normal, DVec3::Z),
+            let [right, down] = [DVec3::X, DVec3::Y].map(|axis| placement.direction_to_world(axis));
+            let (forward, up) = if layout.dims()[2] == 1 && !is_anatomical {
+                // In a plane of its own an image is seen as it is stored.
+                if normal.z.abs() > 0.9 { (DVec3::Z, DVec3::NEG_Y) } else { (right.cross(down), -down) }
+            } else if normal.z.abs() > 0.9 {
+                (-normal, DVec3::Y)
+            } else {
+                (-normal, DVec3::Z)
             };
-            return fit::facing(&points, forward, up, aspect);
+            return fit::facing(&points, forward, options.up.unwrap_or(up), options.aspect());
         }
     }
-    fit::camera(&[layout.world_bounds(root)], direction.unwrap_or_default(), orthographic, aspect)
+    let usual = if is_anatomical { ANATOMICAL_PLANES } else { fit::Direction::default() };
+    fit::camera(&[layout.world_bounds(root)], &placement, options.look(usual))
 }

@@ -23,6 +23,7 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use glam::DVec3;
 use volery_frame::{JoinedBrick, RayTransfer, Revision};
 use volery_octree::{
     Answer, Cut, DataTolerance, Filter, Frustum, Joined, Transparency, Viewpoint, front_to_back, joined,
@@ -231,12 +232,13 @@ pub(crate) fn coarser_by_tolerance(view: &View, rung: usize) -> Option<View> {
 /// A view of all visible matter of a volume, the camera as near as it can be.
 pub(crate) fn matter_view(volume: &VolumeData, options: &ViewOptions, how: How) -> View {
     let transfer = options.transfer_or(|| volume.preset_over(Preset::Auto, options.range));
+    let (grid, layout, placement) = (volume.grid(), volume.source().layout(), volume.placement());
     let blocks = match &transfer {
-        crate::Transfer::Values(function) => fit::visible_blocks(volume.pyramid(), function),
-        crate::Transfer::Magnitudes(_) => vec![volume.world_bounds()],
+        crate::Transfer::Values(function) => fit::visible_blocks(grid, layout, &placement, function),
+        crate::Transfer::Magnitudes(_) => vec![[DVec3::ZERO, grid.extent()]],
     };
-    let direction = options.direction.unwrap_or_default();
-    options.view(fit::camera(&blocks, direction, options.orthographic, options.aspect()), transfer, how)
+    let look = options.look(volume.usual_direction());
+    options.view(fit::camera(&blocks, &placement, look), transfer, how)
 }
 
 /// The exact picture of a volume's matter.

@@ -219,7 +219,7 @@ fn view<D: Data>(
     boxes: impl FnOnce(&Transfer) -> Vec<[DVec3; 2]>,
 ) -> View {
     let transfer = options.transfer_or(|| data.preset_over(Preset::Auto, options.range));
-    let camera = fit::camera(&boxes(&transfer), direction, options.orthographic, options.aspect());
+    let camera = fit::camera(&boxes(&transfer), &data.placement(), options.look(direction));
     options.view(camera, transfer, how)
 }
 

@@ -58,6 +58,7 @@ fn cubes_of_several_buffers_are_drawn_in_order(backend: &mut dyn Backend) {
         target: middle,
         up: glam::DVec3::Z,
         projection: Projection::Orthographic { height: 100.3 },
+        is_mirrored: false,
     };
     let image = draw(backend, [u32::from(LAST); 3], &cubes, camera, [9, 9]);
     let expected = (0..=LAST).rev().fold(0.25, |behind, y| {
@@ -78,7 +79,13 @@ fn pictures_of_several_tiles_have_no_seam(backend: &mut dyn Backend) {
         for distance in [0.0, 20.0] {
             let eye = middle - glam::DVec3::Y * distance;
             let projection = Projection::Perspective { fov_y_deg };
-            let camera = Camera { eye, target: eye + glam::DVec3::Y, up: glam::DVec3::Z, projection };
+            let camera = Camera {
+                eye,
+                target: eye + glam::DVec3::Y,
+                up: glam::DVec3::Z,
+                projection,
+                is_mirrored: false,
+            };
             let image = draw(backend, [16; 3], &[cube], camera, size);
             let rays = camera.rays(size[0], size[1]);
             let expected = |place: usize| {

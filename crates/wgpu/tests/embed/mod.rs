@@ -60,6 +60,7 @@ fn targets_that_do_not_fit_are_named(_: &mut dyn Backend) {
         target: glam::DVec3::ZERO,
         up: glam::DVec3::Y,
         projection: Projection::Orthographic { height: 1.0 },
+        is_mirrored: false,
     };
     let view = PictureView { width: 8, height: 8, camera, background: [0.5; 3], meshes: &[] };
     let mut ends = |target: &wgpu::TextureView, format| {

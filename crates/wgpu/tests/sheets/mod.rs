@@ -92,7 +92,7 @@ fn transfer() -> SheetTransfer {
 }
 
 fn from_above(projection: Projection) -> Camera {
-    Camera { eye: DVec3::Z * 5.0, target: DVec3::ZERO, up: DVec3::Y, projection }
+    Camera { eye: DVec3::Z * 5.0, target: DVec3::ZERO, up: DVec3::Y, projection, is_mirrored: false }
 }
 
 /// What `behind` looks like through matter of a gray and a length.

@@ -113,7 +113,13 @@ fn a_focus_in_an_image_leaves_no_seam() {
         for [x, y] in (1..16).flat_map(|j| (1..16).map(move |i| [BRICK * i, BRICK * j])) {
             let target = DVec3::new(f64::from(x), f64::from(y), 0.0);
             let projection = Projection::Orthographic { height: 30.0 };
-            view.camera = Camera { eye: target - 9.0 * DVec3::Z, target, up: -DVec3::Y, projection };
+            view.camera = Camera {
+                eye: target - 9.0 * DVec3::Z,
+                target,
+                up: -DVec3::Y,
+                projection,
+                is_mirrored: false,
+            };
             largest = largest.max(steepest(&draw(&mut session, &view).image));
         }
         view.camera = session.view(&ViewOptions::default()).camera;

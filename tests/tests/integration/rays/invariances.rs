@@ -45,6 +45,7 @@ fn matters() -> Vec<Matter> {
         target: extent * DVec3::new(0.9, 0.8, 0.1),
         up: DVec3::new(0.1, 0.2, 1.0),
         projection: Projection::Perspective { fov_y_deg: 70.0 },
+        is_mirrored: false,
     };
     let parallel = Camera { projection: Projection::Orthographic { height: 12.0 }, ..aslant(extent) };
     let ramp = || transfer(&[(0.25, 0.0), (0.5, 0.125), (0.75, 0.5)], 1.0);
@@ -130,8 +131,8 @@ impl Matter {
             self.values[(old[2] * self.dims[1] + old[1]) * self.dims[0] + old[0]]
         };
         let values = fill(dims, value);
-        let Camera { eye, target, up, projection } = self.camera;
-        let camera = Camera { eye: vector(eye), target: vector(target), up: vector(up), projection };
+        let Camera { eye, target, up, .. } = self.camera;
+        let camera = Camera { eye: vector(eye), target: vector(target), up: vector(up), ..self.camera };
         Self { dims, spacing: vector(self.spacing), values, camera, ..self }
     }
 }

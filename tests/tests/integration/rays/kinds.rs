@@ -197,6 +197,7 @@ fn rays_in_the_faces_of_the_domain(choice: BackendChoice, test: &str) {
                 target: eye + DVec3::AXES[forward] * sign,
                 up: DVec3::AXES[up] * mirror,
                 projection: Projection::Orthographic { height: 12.5 },
+                is_mirrored: false,
             };
             judge.judge_from(&format!("along axis {forward} x {sign}"), &grid, camera, ramp(), size);
         }

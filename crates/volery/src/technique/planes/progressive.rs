@@ -41,7 +41,9 @@ pub struct Progressive<'a> {
     backend: &'a mut dyn Backend,
     technique: Planes,
     arrivals: Option<&'a dyn NodeSource>,
+    /// As it was asked for, and in the space of the data.
     view: View,
+    local: View,
     planes: PlaneView,
     bricks_per_step: usize,
     target: Chosen,
@@ -67,11 +69,13 @@ impl Session<VolumeData> {
         backend: &'a mut dyn Backend,
     ) -> Result<Progressive<'a>, RenderError> {
         self.check(view)?;
-        let How::Planes(planes) = &view.how else {
+        let local = self.local(view).into_owned();
+        let How::Planes(planes) = &local.how else {
             return Err(RenderError::NotProgressive { technique: view.how.name() });
         };
+        let planes = planes.clone();
         let volume = self.data();
-        let target = choose(volume, view, planes);
+        let target = choose(volume, &local, &planes);
         let layout = volume.source().layout();
         let mut wanted = HashSet::new();
         for &node in &target.cut.nodes {
@@ -94,7 +98,8 @@ impl Session<VolumeData> {
             technique: Planes::default(),
             arrivals,
             view: view.clone(),
-            planes: planes.clone(),
+            local,
+            planes,
             bricks_per_step: bricks_per_step.max(1),
             target,
             wanted,
@@ -117,12 +122,12 @@ impl Progressive<'_> {
         let start = Instant::now();
         let is_last = self.missing.is_empty();
         let chosen = if is_last { self.target.clone() } else { self.finest() };
-        let plan = self.technique.plan_of(self.session.data_mut(), (&self.view, &self.planes), chosen)?;
+        let plan = self.technique.plan_of(self.session.data_mut(), (&self.local, &self.planes), chosen)?;
         let select = start.elapsed().as_secs_f64();
         let start = Instant::now();
         // Where the backend's memory was full, it may have forgotten what is shown.
         uploaded += self.session.upload(&plan, self.backend)?;
-        let drawn = self.session.draw(&self.view, &plan, self.backend)?;
+        let drawn = self.session.draw(&self.local, &plan, self.backend)?;
         let draw = start.elapsed().as_secs_f64();
         let times = [Times { select, geometry: None, upload: Some(upload), draw, paced: None }];
         let picture = self.session.picture(&self.view, plan, drawn, (uploaded, &times), self.backend);
@@ -172,7 +177,7 @@ impl Progressive<'_> {
             if is_drawn { Answer::Draw } else { Answer::Descend }
         };
         let cut = select(layout, answer);
-        Chosen::of(volume, (&self.view, &self.planes), cut)
+        Chosen::of(volume, (&self.local, &self.planes), cut)
     }
 }
 
