@@ -81,8 +81,8 @@ pub fn matter_view(
     [width, height]: [u32; 2],
 ) -> View {
     let meshes = [].into();
-    let (transfer, dial, how) = (transfer.into(), Dial::Full, How::Raycast);
-    View { width, height, camera, background, meshes, transfer, dial, how }
+    let (transfer, dial, interest, how) = (transfer.into(), Dial::Full, [].into(), How::Raycast);
+    View { width, height, camera, background, meshes, transfer, dial, interest, how }
 }
 
 /// The transfer function of a scene that has one over values.
@@ -172,7 +172,7 @@ pub fn at_most(what: &str, measured: f64, threshold: f64) {
 pub struct Unblended<B>(pub B);
 
 impl<B: Backend> Backend for Unblended<B> {
-    volery_conformance::hand_on!(self, self.0 => device set_volume volume is_resident upload evict resident_bytes
+    volery_conformance::hand_on!(self, self.0 => device set_volume volume is_resident upload evict resident_bytes brick_bytes room reserve
         uploaded_bytes begin begin_windows draw_windows wait finished finish);
 
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {

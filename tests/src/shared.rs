@@ -36,7 +36,7 @@ impl Shared {
 }
 
 impl Backend for Shared {
-    volery_conformance::hand_on!(self, self.lock().backend => device volume is_resident upload evict resident_bytes
+    volery_conformance::hand_on!(self, self.lock().backend => device volume is_resident upload evict resident_bytes brick_bytes room reserve
         uploaded_bytes begin begin_windows draw_windows wait draw_part finished finish);
 
     fn set_volume(&mut self, layout: &VolumeLayout) -> Result<(), UploadError> {

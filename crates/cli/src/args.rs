@@ -7,7 +7,7 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use volery::glam::DVec3;
 use volery::io::one_of;
-use volery::io::scene_file::{SceneInput, SceneThickness};
+use volery::io::scene_file::{SceneInput, SceneInterest, SceneSphere, SceneThickness};
 use volery::{BackendChoice, Preset, View};
 
 use crate::wanted;
@@ -119,6 +119,13 @@ pub(crate) struct RenderArgs {
     /// Draw the best picture that so many milliseconds allow (techniques raycast, plane, stack)
     #[arg(long, value_name = "B", value_parser = parse_budget, allow_negative_numbers = true)]
     pub(crate) budget_ms: Option<f64>,
+    /// Draw the best picture that bricks in so much device memory allow: bytes, or KiB, MiB, GiB (technique raycast)
+    #[arg(long, value_name = "BYTES", value_parser = parse_memory, allow_negative_numbers = true)]
+    pub(crate) memory: Option<u64>,
+    /// A region that matters more with --memory, or less: what is lost there counts W times. box:X,Y,Z,X,Y,Z,W from the least
+    /// corner to the greatest, or sphere:X,Y,Z,RADIUS,W; may be given several times
+    #[arg(long, value_name = "REGION", value_parser = parse_interest)]
+    pub(crate) interest: Vec<SceneInterest>,
     /// Where somebody looks, as shares of the picture's width and height: with --budget-ms, what is near is drawn better
     #[arg(long, value_name = "X,Y", value_parser = parse_gaze, allow_hyphen_values = true, requires = "budget_ms")]
     pub(crate) gaze: Option<[f64; 2]>,
@@ -262,6 +269,7 @@ impl RenderArgs {
     pub(crate) fn unread_by_stack(&self) -> Option<&'static str> {
         let others = [
             ("--tolerance", self.tolerance.is_some()),
+            ("--memory", self.memory.is_some()),
             ("--progressive", self.progressive.is_some()),
             ("--bound-map", self.bound_map.is_some()),
         ];
@@ -418,6 +426,32 @@ fn parse_budget(text: &str) -> Result<f64, String> {
     let found = text.parse().ok();
     let good = found.filter(|budget: &f64| *budget >= 0.0 && budget.is_finite());
     good.ok_or_else(|| "expected a number of milliseconds of at least 0".to_owned())
+}
+
+fn parse_memory(text: &str) -> Result<u64, String> {
+    let units = [("KiB", 10), ("MiB", 20), ("GiB", 30)];
+    let (number, shift) = units
+        .into_iter()
+        .find_map(|(unit, shift)| Some((text.strip_suffix(unit)?.trim_end(), shift)))
+        .unwrap_or((text, 0));
+    let bytes = number.parse::<u64>().ok().and_then(|number| number.checked_mul(1 << shift));
+    bytes.ok_or_else(|| "expected a whole number of bytes, KiB, MiB or GiB, such as 64MiB".to_owned())
+}
+
+fn parse_interest(text: &str) -> Result<SceneInterest, String> {
+    let expected = || "expected box:X,Y,Z,X,Y,Z,W or sphere:X,Y,Z,RADIUS,W in world units".to_owned();
+    let (shape, list) = text.split_once(':').ok_or_else(expected)?;
+    let interest = match (shape, numbers(list).as_deref()) {
+        ("box", Some(&[a, b, c, d, e, f, weight])) => {
+            SceneInterest { corners: Some([[a, b, c], [d, e, f]]), sphere: None, weight }
+        }
+        ("sphere", Some(&[x, y, z, radius, weight])) => {
+            let sphere = Some(SceneSphere { center: [x, y, z], radius });
+            SceneInterest { corners: None, sphere, weight }
+        }
+        _ => return Err(expected()),
+    };
+    volery::io::scene_file::check_interest(&interest).map(|()| interest)
 }
 
 fn parse_gaze(text: &str) -> Result<[f64; 2], String> {

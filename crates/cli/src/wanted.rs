@@ -5,14 +5,14 @@ use std::fmt;
 use volery::fit;
 use volery::glam::DVec3;
 use volery::io::scene_file::{
-    SceneBackend, SceneFile, SceneFocus, SceneInput, ScenePlane, SceneTechnique, SceneThickness,
-    SceneTransfer,
+    SceneBackend, SceneFile, SceneFocus, SceneInput, SceneInterest, ScenePlane, SceneSphere, SceneTechnique,
+    SceneThickness, SceneTransfer,
 };
 use volery::io::transfer::{TransferError, TransferOptions, TransferProblem};
 use volery::io::{World, one_of, read_transfer, read_transfer_2d};
 use volery::{
-    Data, Deadline, Dial, Focus, How, Input, InputData, Plane, PlaneView, Preset, Sampling, Session, Slicing,
-    StackView, Thickness, View, ViewOptions,
+    Data, Deadline, Dial, Focus, How, Input, InputData, Interest, Plane, PlaneView, Preset, Region, Sampling,
+    Session, Slicing, StackView, Thickness, View, ViewOptions,
 };
 
 use crate::Failure;
@@ -95,6 +95,7 @@ pub(crate) fn conflict(wanted: &SceneFile, is_of_scene: bool) -> Option<String> 
         ("tolerance", wanted.tolerance.is_some()),
         ("error", wanted.error.is_some()),
         (if is_of_scene { "budget_ms" } else { "budget-ms" }, wanted.budget_ms.is_some()),
+        ("memory", wanted.memory.is_some()),
     ];
     let mut turned = dials.iter().filter(|(_, is_turned)| *is_turned).map(|(name, _)| name);
     if let (Some(first), Some(second)) = (turned.next(), turned.next()) {
@@ -103,6 +104,9 @@ pub(crate) fn conflict(wanted: &SceneFile, is_of_scene: bool) -> Option<String> 
     }
     if is_of_scene && wanted.gaze.is_some() && wanted.budget_ms.is_none() {
         return Some("gaze is read with budget_ms alone".to_owned());
+    }
+    if is_of_scene && !wanted.interest.is_empty() && wanted.memory.is_none() {
+        return Some("interest is read with memory alone".to_owned());
     }
     let given = given(wanted, is_of_scene);
     let alone =
@@ -149,6 +153,8 @@ pub(crate) fn over(args: &RenderArgs, scene: Option<&SceneFile>, input: SceneInp
         tolerance: args.tolerance.or(scene.tolerance),
         budget_ms: args.budget_ms.or(scene.budget_ms),
         gaze: args.gaze.or(scene.gaze),
+        memory: args.memory.or(scene.memory),
+        interest: if args.interest.is_empty() { scene.interest } else { args.interest.clone() },
         planes: if own_planes.is_empty() { scene.planes } else { own_planes },
         focus: focus.or(scene.focus),
         error: args.error.or(scene.error),
@@ -229,16 +235,27 @@ pub(crate) fn view<D: Data>(
         view.camera.up = args.up.unwrap_or(camera.up);
     }
     view.background = wanted.background.unwrap_or(view.background);
-    view.dial = match (wanted.tolerance, wanted.error, wanted.budget_ms) {
-        (Some(tolerance), ..) => Dial::Tolerance(tolerance),
-        (None, Some(error), _) => Dial::Error(error),
-        (None, None, Some(budget)) => {
-            Dial::Deadline(Deadline { budget_secs: 1e-3 * budget, gaze: wanted.gaze })
-        }
-        (None, None, None) => Dial::Full,
-    };
+    view.dial = dial(wanted);
+    view.interest = wanted.interest.iter().filter_map(interest).collect();
     view.meshes = input.meshes.clone();
     Ok(view)
+}
+
+/// A region of a scene, which has been checked.
+fn interest(&SceneInterest { corners, sphere, weight }: &SceneInterest) -> Option<Interest> {
+    let of_box = |[low, high]: [[f64; 3]; 2]| Region::Box { low: low.into(), high: high.into() };
+    let of_sphere =
+        |SceneSphere { center, radius }| Region::Sphere { center: DVec3::from_array(center), radius };
+    let region = corners.map(of_box).or(sphere.map(of_sphere))?;
+    Some(Interest { region, weight })
+}
+
+/// The dial of a scene without conflicts.
+fn dial(wanted: &SceneFile) -> Dial {
+    let deadline = |budget| Deadline { budget_secs: 1e-3 * budget, gaze: wanted.gaze };
+    let tolerance = wanted.tolerance.map(Dial::Tolerance);
+    let others = || wanted.error.map(Dial::Error).or(wanted.memory.map(Dial::Memory));
+    tolerance.or_else(others).or(wanted.budget_ms.map(deadline).map(Dial::Deadline)).unwrap_or_default()
 }
 
 /// The values that the file asks to show, where nothing else says over which ones automatic colours run, and the data

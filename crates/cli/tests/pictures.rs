@@ -112,6 +112,40 @@ fn the_report_has_the_keys_of_the_contract_and_no_others() {
 }
 
 #[test]
+fn a_budget_of_memory_is_kept_and_reported_or_refused() {
+    let shop = Workshop::new();
+    let line = "render waves.nrrd -o a.exr --size 60x50 --backend software";
+    let refused = shop.run_line(&format!("{line} --memory 0"));
+    refused.fails(1, &["memory is 0 bytes", "coarsest cut"]);
+    let words = refused.stderr.split("expected at least ").nth(1).unwrap();
+    let least: u64 = words.split(':').next().unwrap().parse().unwrap();
+    assert!(!shop.path("a.exr").exists());
+    shop.done(&format!("{line} --memory {least} --report least.json"));
+    let report = shop.json("least.json");
+    assert_eq!(report["dial"]["memory"], least);
+    assert!(report["work"]["bytes_resident"].as_u64().unwrap() <= least);
+    assert!(report["error"]["predicted_rmse"].as_f64().unwrap() > 0.0);
+    shop.done(&format!("{line} --report full.json"));
+    let full = shop.bytes("a.exr");
+    shop.done(&format!("{line} --memory 2GiB --report all.json --save-scene scene.json"));
+    assert_eq!(shop.bytes("a.exr"), full, "all of it fits");
+    assert_eq!(shop.json("all.json")["error"]["predicted_rmse"], 0.0);
+    assert_eq!(shop.json("scene.json")["memory"], 2_u64 << 30);
+    shop.done("render scene.json -o b.exr --backend software");
+    assert_eq!(shop.bytes("b.exr"), full);
+    let interest = "--interest sphere:1,2,3,4,5 --interest box:0,0,0,1,1,1,2";
+    shop.run_line(&format!("{line} {interest}")).fails(1, &["interest is read with memory alone"]);
+    shop.done(&format!("{line} --memory 1GiB {interest} --save-scene scene.json"));
+    let found = &shop.json("scene.json")["interest"];
+    assert_eq!(found[0]["sphere"], serde_json::json!({"center": [1.0, 2.0, 3.0], "radius": 4.0}));
+    assert_eq!((&found[1]["box"][1][0], &found[1]["weight"]), (&1.0.into(), &2.0.into()));
+    for technique in ["plane", "fans"] {
+        let line = format!("{line} --memory 1GiB --technique {technique}");
+        shop.run_line(&line).fails(1, &[technique, "Memory", "expected Full"]);
+    }
+}
+
+#[test]
 fn tolerance_0_is_the_full_resolution_bit_for_bit() {
     let shop = Workshop::new();
     shop.write_volume("head.nrrd", &head());

@@ -36,12 +36,14 @@ fn workshop() -> Workshop {
     shop
 }
 
-const LINES: [&str; 28] = [
+const LINES: [&str; 30] = [
     "waves.nrrd",
     "waves.nrrd --size 31x47 --view 200,-30,1.7",
     "waves.nrrd --orthographic --transfer viridis",
     "waves.nrrd --range 60,180 --background 0.1,0.2,0.3",
     "waves.nrrd --tolerance 0.3 --transfer ramp",
+    "waves.nrrd --memory 75KiB --view 15,25",
+    "waves.nrrd --memory 90KiB --interest sphere:8,8,8,6,9 --interest box:30,30,30,39,39,39,0.5 --view 60,5",
     "waves.nrrd --technique fans --thickness interpolated --view 30,20,3",
     "waves.nrrd --technique fans --tolerance 0.1",
     "waves.nrrd --technique plane",

@@ -48,6 +48,21 @@ macro_rules! hand_on {
             $to.resident_bytes()
         }
     };
+    (@brick_bytes $this:ident, $to:expr) => {
+        fn brick_bytes(&$this, layout: &::volery_frame::VolumeLayout, samples: [u32; 3]) -> u64 {
+            $to.brick_bytes(layout, samples)
+        }
+    };
+    (@room $this:ident, $to:expr) => {
+        fn room(&$this, layout: &::volery_frame::VolumeLayout, max_bytes: u64) -> u64 {
+            $to.room(layout, max_bytes)
+        }
+    };
+    (@reserve $this:ident, $to:expr) => {
+        fn reserve(&mut $this, num_bricks: usize, max_bytes: u64) -> Result<(), ::volery_frame::UploadError> {
+            $to.reserve(num_bricks, max_bytes)
+        }
+    };
     (@uploaded_bytes $this:ident, $to:expr) => {
         fn uploaded_bytes(&$this) -> ::volery_frame::UploadedBytes {
             $to.uploaded_bytes()

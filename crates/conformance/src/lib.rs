@@ -150,6 +150,7 @@ properties! { $
         bricks_of_the_same_name_are_replaced
         a_new_volume_forgets_bricks
         resident_bytes_count_the_texels
+        reserved_bytes_are_kept
         many_uploads_one_by_one;
     planes:
         planes_show_the_trilinear_field

@@ -265,3 +265,31 @@ pub fn many_uploads_one_by_one(backend: &mut dyn Backend) {
     let image = draw_resident(backend, &volume, &tf, &camera, SIZE, &bricks);
     assert_same_bits(&format!("{} uploads", bricks.len()), &expected, &image);
 }
+
+/// A backend that was told how many bricks come, and how many bytes it may take, never takes more, whatever it held before;
+/// what bricks are said to take is enough for them.
+pub fn reserved_bytes_are_kept(backend: &mut dyn Backend) {
+    let (volume, camera) = scene();
+    let bricks = volume.bricks(&camera);
+    let layout = &volume.layout;
+    hold(backend, &volume, &bricks);
+    for count in [bricks.len() / 2, bricks.len(), 1, bricks.len() / 3] {
+        let priced: u64 =
+            bricks[..count].iter().map(|brick| backend.brick_bytes(layout, brick.samples)).sum();
+        let mut max_bytes = priced;
+        while backend.room(layout, max_bytes) < priced {
+            max_bytes += priced - backend.room(layout, max_bytes);
+        }
+        assert!(backend.room(layout, 0) == 0 && max_bytes < 4 * priced, "{priced} bytes in {max_bytes}");
+        let others: Vec<BrickId> = bricks[count..].iter().map(|brick| brick.placed.id).collect();
+        backend.evict(&others);
+        backend.reserve(count, max_bytes).expect("room for a few bricks");
+        assert!(backend.resident_bytes() <= max_bytes, "{} of {max_bytes}", backend.resident_bytes());
+        for brick in &bricks[..count] {
+            backend.upload(&[brick.lend()]).expect("reserved");
+            assert!(backend.resident_bytes() <= max_bytes, "{} of {max_bytes}", backend.resident_bytes());
+        }
+        let is_held = |brick: &OwnedBrick| backend.is_resident(brick.placed.id);
+        assert!(bricks[..count].iter().all(is_held) && !bricks[count..].iter().any(is_held));
+    }
+}

@@ -293,6 +293,23 @@ pub trait Backend: Send {
     /// Bytes of device memory that the bricks take, with all that the backend keeps per brick.
     fn resident_bytes(&self) -> u64;
 
+    /// The most bytes of device memory that a brick of so many samples along x, y, z takes while it is resident in a
+    /// volume of this layout, with all that the backend keeps of it. [`Backend::resident_bytes`] after
+    /// [`Backend::reserve`] is never above the sum, and what [`Backend::room`] takes off.
+    fn brick_bytes(&self, layout: &VolumeLayout, samples: [u32; 3]) -> u64;
+
+    /// The part of `max_bytes` of device memory that bricks of this layout may take, by [`Backend::brick_bytes`], so that
+    /// all that is kept for them together, and texels on their way, fit as well.
+    fn room(&self, layout: &VolumeLayout, max_bytes: u64) -> u64;
+
+    /// Makes room for so many bricks in all, those that are resident included, without ever taking more than `max_bytes`:
+    /// where that is not possible beside what is held, all bricks are forgotten. Until other numbers are asked
+    /// for, uploads up to so many bricks that have room take no more either, copies on their way included.
+    ///
+    /// # Errors
+    /// [`UploadError::PoolFull`] when the device cannot hold so many; [`UploadError::Device`] when it fails.
+    fn reserve(&mut self, num_bricks: usize, max_bytes: u64) -> Result<(), UploadError>;
+
     /// What was handed to the device so far.
     fn uploaded_bytes(&self) -> UploadedBytes;
 

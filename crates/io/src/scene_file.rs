@@ -30,7 +30,7 @@ mod check;
 mod transfer;
 
 pub use camera::serialize_camera;
-pub use check::{MAX_PIXELS, MAX_SIDE, SizeError, check_size};
+pub use check::{MAX_PIXELS, MAX_SIDE, SizeError, check_interest, check_size};
 pub use transfer::serialize as serialize_transfer;
 
 /// Scene files larger than this are refused.
@@ -74,9 +74,15 @@ pub struct SceneFile {
     /// Milliseconds until the picture shall be there.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::budget")]
     pub budget_ms: Option<f64>,
+    /// Bytes of device memory that bricks may take.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<u64>,
     /// Where somebody looks, as shares of the picture from its upper left corner.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "check::gaze")]
     pub gaze: Option<[f64; 2]>,
+    /// Regions that matter more than the rest, or less, with `memory`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "check::interest")]
+    pub interest: Vec<SceneInterest>,
     /// Cutting planes.
     #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "check::planes")]
     pub planes: Vec<ScenePlane>,
@@ -237,6 +243,30 @@ pub struct SceneFocus {
     /// A node is drawn where its centre is farther than so many of its diagonals.
     #[serde(default = "usual_quality")]
     pub quality: f64,
+}
+
+/// A region of interest: a box or a sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneInterest {
+    /// Least and greatest corner in world space, in place of a sphere.
+    #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
+    pub corners: Option<[[f64; 3]; 2]>,
+    /// In place of a box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sphere: Option<SceneSphere>,
+    /// How many times a difference of colour counts there.
+    pub weight: f64,
+}
+
+/// A sphere in world space.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSphere {
+    /// Its middle.
+    pub center: [f64; 3],
+    /// Above 0.
+    pub radius: f64,
 }
 
 /// An opaque surface of a scene.

@@ -57,10 +57,11 @@
 //! its error is `+∞`. Their presence coarsens the unit by the number of finest nodes. Errors below 0 count as 0.
 //!
 //! # Non-goals
-//! No weights, which are a caller's and part of the price (interest, visibility; what is skipped costs nothing); no 2:1
-//! balance, which would spend bytes that this has already spent; no bytes moved: what of the last cut stays is for the
+//! No weights, which are a caller's and part of the price (interest, visibility; what is skipped costs nothing); 2:1
+//! balance, which would spend bytes that this has already spent, is [`Balanced`]'s; no bytes moved: what of the last cut stays is for the
 //! caller to see.
 
+mod balanced;
 mod fixed;
 mod gap;
 mod hull;
@@ -68,6 +69,7 @@ mod search;
 
 use volery_pyramid::{Layout, Node};
 
+pub use balanced::Balanced;
 use fixed::Scale;
 use gap::Gap;
 use hull::{Hulls, Prices};

@@ -35,7 +35,7 @@ pub mod validate;
 
 pub use balance::balance;
 pub use blend::low_corners;
-pub use budget::{BudgetTooSmall, Budgeted, Held, Price, Tradeoff, Uncovered};
+pub use budget::{Balanced, BudgetTooSmall, Budgeted, Held, Price, Tradeoff, Uncovered};
 pub use certify::{Certified, certified, without_unseen};
 pub use cut::Cut;
 pub use filters::{CuttingPlanes, DataTolerance, Focus, Frustum, Transparency};

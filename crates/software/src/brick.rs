@@ -76,6 +76,15 @@ impl<T: Texel> StoredBrick<T> {
         Self { samples, texels: texels.into(), blocks, ranges: ranges.into(), marked: Mutex::default() }
     }
 
+    /// As [`StoredBrick::bytes`] of a brick of so many samples.
+    pub(crate) fn bytes_of(samples: [u32; 3], block: u32) -> u64 {
+        let product = |counts: [u32; 3]| counts.iter().map(|&n| u64::from(n)).product::<u64>();
+        let blocks = samples.map(|n| n.saturating_sub(1).div_ceil(block));
+        size_of::<Self>() as u64
+            + product(samples) * size_of::<T>() as u64
+            + product(blocks) * size_of::<[T; 2]>() as u64
+    }
+
     pub(crate) fn bytes(&self) -> u64 {
         let Self { samples: _, texels, blocks: _, ranges, marked: _ } = self;
         (size_of::<Self>() + size_of_val::<[T]>(texels) + size_of_val::<[[T; 2]]>(ranges)) as u64

@@ -225,6 +225,20 @@ impl Backend for SoftwareBackend {
         self.volume.as_ref().map_or(0, |(_, pool)| pool.bytes())
     }
 
+    fn brick_bytes(&self, layout: &VolumeLayout, samples: [u32; 3]) -> u64 {
+        Pool::brick_bytes(layout.texel, samples, brick::block_cells(layout.brick_cells))
+    }
+
+    /// Without one brick on its way.
+    fn room(&self, layout: &VolumeLayout, max_bytes: u64) -> u64 {
+        max_bytes.saturating_sub(self.brick_bytes(layout, [layout.brick_cells.saturating_add(1); 3]))
+    }
+
+    /// Bricks take what they need when they come.
+    fn reserve(&mut self, _num_bricks: usize, _max_bytes: u64) -> Result<(), UploadError> {
+        Ok(())
+    }
+
     fn uploaded_bytes(&self) -> UploadedBytes {
         UploadedBytes::default()
     }

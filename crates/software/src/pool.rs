@@ -51,6 +51,17 @@ impl Pool {
         for_bricks!(self, |bricks| bricks.values().map(StoredBrick::bytes).sum())
     }
 
+    /// What a brick of so many samples takes in a pool of these texels; blocks have `block` cells per axis.
+    pub(crate) fn brick_bytes(texel: TexelType, samples: [u32; 3], block: u32) -> u64 {
+        match texel {
+            TexelType::U8 => StoredBrick::<u8>::bytes_of(samples, block),
+            TexelType::U16 => StoredBrick::<u16>::bytes_of(samples, block),
+            TexelType::F32 => StoredBrick::<f32>::bytes_of(samples, block),
+            // Four planes of bytes; the ranges that there are not are room to spare.
+            TexelType::Rgba8 => 4 * StoredBrick::<u8>::bytes_of(samples, block),
+        }
+    }
+
     pub(crate) fn remove(&mut self, old: &[BrickId]) {
         for_bricks!(self, |bricks| old.iter().for_each(|id| drop(bricks.remove(id))));
     }

@@ -27,6 +27,7 @@ pub mod fit;
 pub mod histogram;
 pub mod info;
 mod input;
+mod interest;
 mod matter_bound;
 pub mod output;
 mod path;
@@ -47,6 +48,7 @@ pub use data::{
 pub use histogram::Histogram;
 pub use info::{GridInfo, Info, StackInfo};
 pub use input::{Input, InputData, InputError, InputOptions, InputPlan, read_input};
+pub use interest::{Interest, Region};
 pub use matter_bound::MatterBound;
 pub use path::Path;
 pub use report::Report;

@@ -237,6 +237,9 @@ pub struct Dial {
     /// Milliseconds until the picture was to be there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget_ms: Option<f64>,
+    /// Bytes of device memory that bricks might take.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<u64>,
     /// Where somebody looked, as shares of the picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaze: Option<[f64; 2]>,
@@ -256,6 +259,10 @@ pub struct Error {
     /// The root mean square over all pixels of what they may differ by: no rmse is above it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound_rms: Option<f64>,
+    /// With a budget of memory: what the root mean square of the difference from the full resolution is predicted to be,
+    /// by which the cut was chosen. No bound, and its errors are larger than rounding's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub predicted_rmse: Option<f64>,
     /// What the bounds are against.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound_against: Option<&'static str>,

@@ -60,13 +60,35 @@ pub(crate) fn upload(
     if backend.volume() != Some(layout.revision) {
         backend.set_volume(layout)?;
     }
-    match upload_missing(source, encoding, nodes, backend) {
+    match upload_missing(source, encoding, nodes, BATCH_BYTES, backend) {
         Err(Error::Upload(UploadError::PoolFull { .. })) => {
             evict_others(source.layout(), nodes, backend);
-            upload_missing(source, encoding, nodes, backend)
+            upload_missing(source, encoding, nodes, BATCH_BYTES, backend)
         }
         other => other,
     }
+}
+
+/// As [`upload`], never above `max_bytes` of the backend's memory: what is not needed goes before anything comes, what is
+/// stays, and what is on its way fits as well, at least one brick of it.
+pub(crate) fn upload_within(
+    source: &dyn NodeSource,
+    store: &Store,
+    nodes: &[Node],
+    max_bytes: u64,
+    backend: &mut dyn Backend,
+) -> Result<Uploaded, Error> {
+    let Store { layout, encoding } = store;
+    if backend.volume() != Some(layout.revision) {
+        backend.set_volume(layout)?;
+    }
+    evict_others(source.layout(), nodes, backend);
+    backend.reserve(nodes.len(), max_bytes)?;
+    // At most brick_cells + 1 samples, which fits.
+    let samples = |node: Node| source.layout().brick_shape(node).count.map(|n| n as u32);
+    let all: u64 = nodes.iter().map(|&node| backend.brick_bytes(layout, samples(node))).sum();
+    let left = usize::try_from(max_bytes.saturating_sub(all)).unwrap_or(BATCH_BYTES);
+    upload_missing(source, encoding, nodes, left.min(BATCH_BYTES), backend)
 }
 
 /// Bytes of texels of the nodes whose bricks are not resident, were all bricks whole.
@@ -91,7 +113,7 @@ pub(crate) fn prefetch(
 ) -> Result<Uploaded, Error> {
     let num = (max_bytes / brick_bytes(source, store)).max(1) as usize;
     let nodes: Vec<Node> = missing(source.layout(), store, nodes, backend).take(num).collect();
-    match upload_missing(source, &store.encoding, &nodes, backend) {
+    match upload_missing(source, &store.encoding, &nodes, BATCH_BYTES, backend) {
         Err(Error::Upload(UploadError::PoolFull { .. })) => Ok(Uploaded::default()),
         other => other,
     }
@@ -127,6 +149,7 @@ fn upload_missing(
     source: &dyn NodeSource,
     encoding: &Encoding,
     nodes: &[Node],
+    batch_bytes: usize,
     backend: &mut dyn Backend,
 ) -> Result<Uploaded, Error> {
     let numbers = Numbers::of(source.layout());
@@ -137,7 +160,7 @@ fn upload_missing(
         .collect();
     let samples = (source.layout().brick_cells() + 1).pow(3);
     let bytes_per_slot = samples * encoding.texel.bytes().max(source.sample_type().bytes());
-    let num_slots = (BATCH_BYTES / bytes_per_slot).clamp(1, missing.len().max(1));
+    let num_slots = (batch_bytes / bytes_per_slot).clamp(1, missing.len().max(1));
     let new_slot = || (Brick::empty(source.sample_type()), Buffer::default());
     let mut slots: Vec<_> = std::iter::repeat_with(new_slot).take(num_slots).collect();
     let mut uploaded = Uploaded::default();

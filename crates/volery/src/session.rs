@@ -148,11 +148,11 @@ impl<D: Data> Session<D> {
                 technique.forget_view();
             }
             let start = Instant::now();
-            let plan = technique.plan(&mut self.data, local)?;
+            let plan = technique.plan(&mut self.data, local, backend)?;
             let geometry = plan.geometry_seconds;
             let select = start.elapsed().as_secs_f64() - geometry.unwrap_or(0.0);
             let start = Instant::now();
-            uploaded += self.upload(&plan, backend)?;
+            uploaded += self.upload(&plan, memory_of(view), backend)?;
             let upload = plan.store.is_some().then(|| start.elapsed().as_secs_f64());
             let start = Instant::now();
             let drawn = self.draw(local, &plan, backend)?;
@@ -224,11 +224,21 @@ impl<D: Data> Session<D> {
     }
 
     /// Makes resident what a plan needs.
-    pub(crate) fn upload(&self, plan: &Plan, backend: &mut dyn Backend) -> Result<Uploaded, RenderError> {
+    ///
+    /// With a largest number of bytes it is they that the backend never takes more than.
+    pub(crate) fn upload(
+        &self,
+        plan: &Plan,
+        max_bytes: Option<u64>,
+        backend: &mut dyn Backend,
+    ) -> Result<Uploaded, RenderError> {
         let (Some((store, nodes)), Some(source)) = (&plan.store, self.data.bricks()) else {
             return Ok(Uploaded { bytes: plan.work.slice_bytes.map_or(0, |[_, sent]| sent), bricks: 0 });
         };
-        Ok(residency::upload(source, store, nodes, backend)?)
+        Ok(match max_bytes {
+            Some(max_bytes) => residency::upload_within(source, store, nodes, max_bytes, backend)?,
+            None => residency::upload(source, store, nodes, backend)?,
+        })
     }
 
     pub(crate) fn draw(
@@ -257,6 +267,7 @@ impl<D: Data> Session<D> {
             tolerance: if let Dial::Tolerance(tolerance) = view.dial { Some(tolerance) } else { None },
             error: if let Dial::Error(error) = view.dial { Some(error) } else { None },
             budget_ms: deadline.map(|deadline| 1e3 * deadline.budget_secs),
+            memory: memory_of(view),
             gaze: deadline.and_then(|deadline| deadline.gaze),
             quality: focus.map(|focus| focus.quality),
         };
@@ -291,6 +302,11 @@ impl<D: Data> Session<D> {
     }
 }
 
+/// The bytes of device memory that a view allows.
+fn memory_of(view: &View) -> Option<u64> {
+    if let Dial::Memory(bytes) = view.dial { Some(bytes) } else { None }
+}
+
 /// What a backend is told of a view.
 fn picture_view(view: &View) -> PictureView<'_> {
     PictureView {
@@ -311,9 +327,10 @@ fn error_of(plan: &Plan, drawn: &Drawn) -> Option<report::Error> {
         _ => None,
     };
     let against = if budget.is_some() { report::AGAINST_EXACT } else { "full resolution" };
-    let bound_against = plan.bound_max.map(|_| against);
+    let (bound_max, predicted_rmse) = (plan.bound_max, plan.predicted_rmse);
+    let bound_against = bound_max.map(|_| against);
     let error =
-        report::Error { bound_max: plan.bound_max, bound_against, budget, ..report::Error::default() };
+        report::Error { bound_max, bound_against, predicted_rmse, budget, ..report::Error::default() };
     (error != report::Error::default()).then_some(error)
 }
 

@@ -8,6 +8,7 @@ use volery_frame::{Sampling, Thickness};
 use volery_scene::{Camera, Plane, TransferFunction, TransferFunction2d, TriangleMesh};
 
 use crate::fit;
+use crate::interest::Interest;
 use crate::session::RenderError;
 
 /// One picture: what to see of data, from where, how, and how well.
@@ -27,6 +28,8 @@ pub struct View {
     pub transfer: Transfer,
     /// What the picture may miss.
     pub dial: Dial,
+    /// Regions whose errors count more, or less, where a budget of memory is shared out: with [`Dial::Memory`] alone.
+    pub interest: Arc<[Interest]>,
     /// By which technique, with its options.
     pub how: How,
 }
@@ -52,6 +55,9 @@ pub enum Dial {
     Error(f64),
     /// As much as is needed for the picture to be there in time.
     Deadline(Deadline),
+    /// As much as bricks in so many bytes of device memory can show, with all that is kept for them and what is on its
+    /// way to the device.
+    Memory(u64),
 }
 
 /// When a picture must be there, and what of it matters most.
@@ -205,6 +211,7 @@ impl ViewOptions {
             meshes: [].into(),
             transfer,
             dial: Dial::Full,
+            interest: [].into(),
             how,
         }
     }
@@ -224,7 +231,11 @@ impl View {
                 return Err(RenderError::MaxError { found });
             }
             Dial::Deadline(found) if !found.is_meaningful() => return Err(RenderError::Deadline { found }),
-            Dial::Full | Dial::Tolerance(_) | Dial::Error(_) | Dial::Deadline(_) => {}
+            Dial::Full | Dial::Tolerance(_) | Dial::Error(_) | Dial::Deadline(_) | Dial::Memory(_) => {}
+        }
+        let is_read = matches!(self.dial, Dial::Memory(_));
+        if let Some(&found) = self.interest.iter().find(|interest| !is_read || !interest.is_meaningful()) {
+            return Err(RenderError::Interest { found, dial: self.dial });
         }
         let found = self.background;
         if !found.iter().all(|c| (0.0..=1.0).contains(c)) {

@@ -13,7 +13,7 @@ use crate::jobs::Jobs;
 use crate::needs;
 use crate::picture::{Finish, Kept, PartKind, Picture};
 use crate::plane::Plane;
-use crate::pool::Pool;
+use crate::pool::{Pool, Shape};
 use crate::present::Present;
 use crate::raycast::Raycast;
 use crate::sheets::SheetStacks;
@@ -223,6 +223,19 @@ impl Backend for WgpuBackend {
 
     fn resident_bytes(&self) -> u64 {
         self.pool.as_ref().map_or(0, Pool::resident_bytes)
+    }
+
+    fn brick_bytes(&self, layout: &VolumeLayout, samples: [u32; 3]) -> u64 {
+        Shape::of(&self.gpu, layout).brick_bytes(layout, samples)
+    }
+
+    fn room(&self, layout: &VolumeLayout, max_bytes: u64) -> u64 {
+        Shape::of(&self.gpu, layout).room(max_bytes)
+    }
+
+    fn reserve(&mut self, num_bricks: usize, max_bytes: u64) -> Result<(), UploadError> {
+        let Some(pool) = &mut self.pool else { return Ok(()) };
+        pool.reserve_within(&self.gpu, num_bricks, max_bytes)
     }
 
     fn uploaded_bytes(&self) -> UploadedBytes {

@@ -45,8 +45,13 @@ impl Summary {
 
     /// Blocks along each axis.
     pub(crate) fn num_blocks(&self, brick_cells: u32) -> [u32; 3] {
-        self.cells.map(|cells| cells.div_ceil(block_cells(brick_cells)))
+        num_blocks(self.cells, brick_cells)
     }
+}
+
+/// Blocks along each axis of a brick of so many cells.
+pub(crate) fn num_blocks(cells: [u32; 3], brick_cells: u32) -> [u32; 3] {
+    cells.map(|cells| cells.div_ceil(block_cells(brick_cells)))
 }
 
 fn ranges<T: Copy>(samples: [u32; 3], texels: &[T], block: u32, to_f32: impl Fn(T) -> f32) -> Vec<[f32; 2]> {

@@ -7,28 +7,33 @@
 //! Four 8-bit texels of successive z in one word, so that one gather reads a cell, were 11 % faster there, but a
 //! third larger, with a second kind of atlas: not done.
 
+mod shape;
+
 use std::collections::HashMap;
 
-use volery_frame::{Brick, BrickId, TexelType, Texels, UploadError, VolumeLayout};
-use volery_shaders::raycast::{BLANK, CELLS_MASK, SLOT_MASK};
+use volery_frame::{Brick, BrickId, Texels, UploadError, VolumeLayout};
+use volery_shaders::raycast::{BLANK, CELLS_MASK};
 
 use crate::blocks::Summary;
 use crate::gpu::{Failure, Gpu, Upload};
 use crate::units::Resident;
+pub(crate) use shape::Shape;
 
-/// Bytes handed to the device before it is asked to take them: bounds the memory of copies under way.
+/// Bytes handed to the device before it is asked to take them: bounds the memory of copies under way where nobody
+/// bounds all of it.
 const BYTES_IN_FLIGHT: usize = 32 << 20;
 
 /// The bricks of one volume.
 pub(crate) struct Pool {
     layout: VolumeLayout,
-    format: wgpu::TextureFormat,
-    slot: Slot,
+    shape: Shape,
     atlas: Option<Atlas>,
     resident: HashMap<BrickId, Resident>,
     num_slots_used: u32,
     /// Of those used, which hold nothing any more.
     free_slots: Vec<u32>,
+    /// Bytes of copies under way at one time; a brick's may be more.
+    bytes_in_flight: usize,
     /// Grows with every change of what is resident, so that what was made of it can be told old.
     generation: u64,
 }
@@ -76,30 +81,22 @@ impl Pool {
     /// An empty pool for bricks of a layout.
     pub(crate) fn new(gpu: &Gpu, layout: &VolumeLayout) -> Result<Self, UploadError> {
         let max_dimension = gpu.device.limits().max_texture_dimension_2d;
-        let slot = Slot::new(layout.brick_cells.saturating_add(1), max_dimension);
+        let shape = Shape::of(gpu, layout);
+        let slot = shape.slot;
         if !(1..=CELLS_MASK).contains(&layout.brick_cells) || slot.size.iter().any(|&n| n > max_dimension) {
             let found = layout.brick_cells;
             return Err(UploadError::Device(format!(
                 "bricks of {found} cells, expected 1 to {CELLS_MASK} that fit a texture of {max_dimension} texels"
             )));
         }
-        let has_16_bits = gpu.has(wgpu::Features::TEXTURE_FORMAT_16BIT_NORM);
-        let format = match layout.texel {
-            TexelType::U8 => wgpu::TextureFormat::R8Unorm,
-            TexelType::U16 if has_16_bits => wgpu::TextureFormat::R16Unorm,
-            TexelType::U16 | TexelType::F32 => wgpu::TextureFormat::R32Float,
-            TexelType::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
-        };
-        let resident = HashMap::new();
-        let (atlas, free_slots) = (None, Vec::new());
         Ok(Self {
             layout: *layout,
-            format,
-            slot,
-            atlas,
-            resident,
+            shape,
+            atlas: None,
+            resident: HashMap::new(),
             num_slots_used: 0,
-            free_slots,
+            free_slots: Vec::new(),
+            bytes_in_flight: BYTES_IN_FLIGHT,
             generation: 0,
         })
     }
@@ -121,7 +118,7 @@ impl Pool {
     }
 
     pub(crate) fn slot(&self) -> Slot {
-        self.slot
+        self.shape.slot
     }
 
     /// Slots that were ever used.
@@ -140,7 +137,7 @@ impl Pool {
 
     /// How many steps of the uploaded texels make one of what the shader reads.
     pub(crate) fn texels_per_unit(&self) -> f64 {
-        match self.format {
+        match self.shape.format {
             wgpu::TextureFormat::R8Unorm => 255.0,
             wgpu::TextureFormat::R16Unorm => 65535.0,
             _ => 1.0,
@@ -148,23 +145,10 @@ impl Pool {
     }
 
     pub(crate) fn resident_bytes(&self) -> u64 {
-        let Self { layout: _, format: _, slot: _, atlas, resident, .. } = self;
-        let texels = atlas.as_ref().map_or(0, |atlas| {
-            u64::from(atlas.texture.width())
-                * u64::from(atlas.texture.height())
-                * self.texel_bytes()
-                * u64::from(atlas.texture.depth_or_array_layers())
-        });
+        let Self { layout: _, shape, atlas, resident, .. } = self;
+        let texels = atlas.as_ref().map_or(0, |atlas| u64::from(atlas.capacity) * shape.slot_bytes());
         let ranges: usize = resident.values().map(|brick| size_of_val(brick.summary.ranges.as_slice())).sum();
         texels + ranges as u64
-    }
-
-    fn texel_bytes(&self) -> u64 {
-        match self.format {
-            wgpu::TextureFormat::R8Unorm => 1,
-            wgpu::TextureFormat::R16Unorm => 2,
-            _ => 4,
-        }
     }
 
     pub(crate) fn upload(&mut self, gpu: &Gpu, bricks: &[Brick<'_>]) -> Result<(), UploadError> {
@@ -186,15 +170,16 @@ impl Pool {
         let written = gpu.checked(|| {
             let mut bytes = 0;
             for brick in bricks {
-                bytes += self.write(gpu, atlas, slots[&brick.id], brick);
-                if bytes > BYTES_IN_FLIGHT {
+                if bytes + self.shape.slot_bytes() as usize > self.bytes_in_flight {
                     bytes = 0;
                     gpu.queue.submit([]);
                     gpu.wait()?;
                 }
+                bytes += self.write(gpu, atlas, slots[&brick.id], brick);
             }
             gpu.queue.submit([]);
-            Ok(())
+            // Who bounds memory brings more soon.
+            if self.bytes_in_flight < BYTES_IN_FLIGHT { gpu.wait() } else { Ok(()) }
         });
         (self.num_slots_used, self.free_slots) = (num_slots, free);
         if let Err(failure) = written.and_then(|result| result) {
@@ -216,26 +201,61 @@ impl Pool {
         self.generation += 1;
     }
 
-    /// Makes room for so many slots.
+    /// Makes room for so many bricks, and no more than that, without ever taking more than `max_bytes`.
+    pub(crate) fn reserve_within(
+        &mut self,
+        gpu: &Gpu,
+        num_bricks: usize,
+        max_bytes: u64,
+    ) -> Result<(), UploadError> {
+        let num_slots = u32::try_from(num_bricks).unwrap_or(u32::MAX);
+        let (capacity, wanted) = (self.capacity(), self.shape.texture_bytes(num_slots));
+        let held = u64::from(capacity) * self.shape.slot_bytes();
+        if capacity < num_slots || held > max_bytes {
+            if self.resident_bytes().saturating_add(wanted) > max_bytes || capacity > num_slots {
+                self.forget(gpu)?;
+            }
+            if num_slots > 0 {
+                self.grow(gpu, num_slots)?;
+            }
+        }
+        let left = max_bytes.saturating_sub(self.resident_bytes()) as usize;
+        self.bytes_in_flight = left.min(BYTES_IN_FLIGHT - 1);
+        Ok(())
+    }
+
+    fn capacity(&self) -> u32 {
+        self.atlas.as_ref().map_or(0, |atlas| atlas.capacity)
+    }
+
+    /// Gives back all that bricks take.
+    fn forget(&mut self, gpu: &Gpu) -> Result<(), UploadError> {
+        self.resident.clear();
+        self.free_slots.clear();
+        self.num_slots_used = 0;
+        self.generation += 1;
+        if let Some(atlas) = self.atlas.take() {
+            atlas.texture.destroy();
+        }
+        gpu.wait().map_err(|failure| UploadError::Device(failure.to_string()))
+    }
+
+    /// Makes room for so many slots, bounded by the device alone.
     fn reserve(&mut self, gpu: &Gpu, num_slots: u32) -> Result<(), UploadError> {
-        let capacity = self.atlas.as_ref().map_or(0, |atlas| atlas.capacity);
+        let capacity = self.capacity();
         if num_slots <= capacity {
             return Ok(());
         }
+        self.bytes_in_flight = BYTES_IN_FLIGHT;
         // Half as much again, so that bricks that come one by one are copied a bounded number of times.
         let generous = num_slots.max(capacity + capacity / 2);
         self.grow(gpu, generous).or_else(|_| self.grow(gpu, num_slots))
     }
 
     fn grow(&mut self, gpu: &Gpu, capacity: u32) -> Result<(), UploadError> {
-        let limits = gpu.device.limits();
-        let [width, height] = self.slot.size;
-        let slot_bytes = u64::from(width) * u64::from(height) * self.texel_bytes();
-        let max_rows = (limits.max_texture_dimension_2d / height).min(SLOT_MASK + 1);
-        // Layers of equal height waste least.
-        let layers = capacity.div_ceil(max_rows.max(1)).max(1);
-        let slots_per_layer = capacity.div_ceil(layers).max(1);
-        let max_layers = limits.max_texture_array_layers.min(SLOT_MASK + 1);
+        let Shape { format, slot, max_slots: [max_rows, max_layers] } = self.shape;
+        let ([width, height], slot_bytes) = (slot.size, self.shape.slot_bytes());
+        let [layers, slots_per_layer] = self.shape.layers(capacity);
         if layers > max_layers {
             let max = u64::from(max_rows) * u64::from(max_layers) * slot_bytes;
             return Err(UploadError::PoolFull { required: u64::from(capacity) * slot_bytes, max });
@@ -246,7 +266,7 @@ impl Pool {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: self.format,
+            format,
             usage: wgpu::TextureUsages::TEXTURE_BINDING
                 | wgpu::TextureUsages::COPY_DST
                 | wgpu::TextureUsages::COPY_SRC,
@@ -256,7 +276,7 @@ impl Pool {
             let texture = gpu.device.create_texture(&descriptor);
             let atlas = Atlas { texture, slots_per_layer, capacity: slots_per_layer * layers };
             if let Some(old) = &self.atlas {
-                copy_slots(gpu, old, &atlas, self.num_slots_used, self.slot);
+                copy_slots(gpu, old, &atlas, self.num_slots_used, slot);
             }
             gpu.wait().map(|()| atlas)
         });
@@ -267,7 +287,7 @@ impl Pool {
                 Ok(())
             }
             Err(Failure::OutOfMemory) => {
-                let held = self.atlas.as_ref().map_or(0, |atlas| u64::from(atlas.capacity) * slot_bytes);
+                let held = u64::from(self.capacity()) * slot_bytes;
                 Err(UploadError::PoolFull { required: u64::from(capacity) * slot_bytes, max: held })
             }
             Err(Failure::Other(text)) => Err(UploadError::Device(text)),
@@ -276,24 +296,24 @@ impl Pool {
 
     /// Hands a brick's texels to the device and returns their bytes.
     fn write(&self, gpu: &Gpu, atlas: &Atlas, index: u32, brick: &Brick<'_>) -> usize {
-        let samples = brick.samples;
+        let (samples, slot) = (brick.samples, self.shape.slot);
         let bytes = match brick.texels {
-            Texels::U8(texels) => self.slot.fold(samples, texels, |texel| texel),
-            Texels::U16(texels) if self.format == wgpu::TextureFormat::R16Unorm => {
-                self.slot.fold(samples, texels, |texel| texel)
+            Texels::U8(texels) => slot.fold(samples, texels, |texel| texel),
+            Texels::U16(texels) if self.shape.format == wgpu::TextureFormat::R16Unorm => {
+                slot.fold(samples, texels, |texel| texel)
             }
-            Texels::U16(texels) => self.slot.fold(samples, texels, f32::from),
-            Texels::F32(texels) => self.slot.fold(samples, texels, storable),
-            Texels::Rgba8(texels) => self.slot.fold(samples, texels, |texel| texel),
+            Texels::U16(texels) => slot.fold(samples, texels, f32::from),
+            Texels::F32(texels) => slot.fold(samples, texels, storable),
+            Texels::Rgba8(texels) => slot.fold(samples, texels, |texel| texel),
         };
-        let [width, height] = self.slot.size;
+        let [width, height] = slot.size;
         gpu.count(Upload::Bricks, bytes.len());
         gpu.queue.write_texture(
-            atlas.place(index, self.slot),
+            atlas.place(index, slot),
             &bytes,
             wgpu::TexelCopyBufferLayout {
                 offset: 0,
-                bytes_per_row: Some(width * self.texel_bytes() as u32),
+                bytes_per_row: Some(width * self.shape.texel_bytes() as u32),
                 rows_per_image: Some(height),
             },
             wgpu::Extent3d { width, height, depth_or_array_layers: 1 },

@@ -21,7 +21,7 @@ struct Keeping {
 }
 
 impl Backend for Keeping {
-    volery_conformance::hand_on!(self, self.backend => device set_volume volume is_resident upload evict resident_bytes
+    volery_conformance::hand_on!(self, self.backend => device set_volume volume is_resident upload evict resident_bytes brick_bytes room reserve
         uploaded_bytes begin begin_windows draw_windows wait finished finish);
 
     fn draw_part(&mut self, content: &Content<'_>) -> Result<u32, DrawError> {

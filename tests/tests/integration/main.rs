@@ -28,6 +28,7 @@ mod files;
 mod grid_truth;
 mod grids;
 mod grids_peers;
+mod memory;
 mod meshes;
 mod opacity;
 mod orientation;

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-use super::{SceneFocus, SceneMesh, ScenePlane};
+use super::{SceneFocus, SceneInterest, SceneMesh, ScenePlane};
 use crate::layout::Element;
 
 /// The largest width or height of a picture.
@@ -128,6 +128,39 @@ pub(super) fn focus<'de, D: Deserializer<'de>>(deserializer: D) -> Checked<Scene
         }
         focus => Ok(focus),
     }
+}
+
+/// Checks a region of interest, from a scene or elsewhere.
+///
+/// # Errors
+/// Says what is wrong with it, and what was expected.
+pub fn check_interest(interest: &SceneInterest) -> Result<(), String> {
+    let SceneInterest { corners, sphere, weight } = *interest;
+    let is_region = match (corners, sphere) {
+        (Some([low, high]), None) => (0..3).all(|axis| low[axis] <= high[axis]),
+        (None, Some(sphere)) => sphere.radius > 0.0,
+        _ => return Err("box and sphere, expected one of the two".to_owned()),
+    };
+    let of_sphere = sphere.iter().flat_map(|sphere| sphere.center.iter().chain([&sphere.radius]));
+    if !is_region || !corners.iter().flatten().flatten().chain(of_sphere).all(|x| x.is_finite()) {
+        let expected =
+            "expected finite numbers, a box with low at most high, or a sphere with a radius above 0";
+        return Err(format!("{interest:?}, {expected}"));
+    }
+    if weight >= 0.0 && weight.is_finite() {
+        Ok(())
+    } else {
+        Err(format!("weight is {weight:?}, expected a number of at least 0"))
+    }
+}
+
+pub(super) fn interest<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<SceneInterest>, D::Error> {
+    let regions = Vec::<SceneInterest>::deserialize(deserializer)?;
+    for (index, region) in regions.iter().enumerate() {
+        check_interest(region)
+            .map_err(|problem| D::Error::custom(format!("interest[{index}]: {problem}")))?;
+    }
+    Ok(regions)
 }
 
 pub(super) fn planes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<ScenePlane>, D::Error> {

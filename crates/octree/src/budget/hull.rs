@@ -59,10 +59,9 @@ pub(super) struct Prices {
 impl Prices {
     /// Asks for every price, level by level from the finest.
     pub(super) fn ask(layout: &Layout, mut price: impl FnMut(Node, u32) -> Option<Price>) -> (Self, Scale) {
-        let num_nodes: usize = (0..layout.num_levels()).map(|level| layout.num_nodes(level)).sum();
-        let most_bytes = (1 << SUM_BITS) / num_nodes as u64;
+        let most_bytes = Self::most_bytes(layout);
         let mut asked = Vec::new();
-        let mut largest = Vec::with_capacity(num_nodes);
+        let mut largest = Vec::new();
         let mut has_unknown = false;
         for level in 0..layout.num_levels() {
             let num = layout.num_nodes(level);
@@ -89,6 +88,28 @@ impl Prices {
         let scale = Scale::new(&largest, has_unknown, layout.num_nodes(0));
         let levels = (0..).zip(&asked).map(|(level, lists)| choices(layout, level, lists, &scale)).collect();
         (Self { levels }, scale)
+    }
+
+    /// More than this a node cannot be counted at.
+    pub(super) fn most_bytes(layout: &Layout) -> u64 {
+        let num_nodes: usize = (0..layout.num_levels()).map(|level| layout.num_nodes(level)).sum();
+        (1 << SUM_BITS) / num_nodes as u64
+    }
+
+    /// Raises the error of nodes that have one choice each to that of their children together, where it is below.
+    pub(super) fn raise(&mut self, layout: &Layout) {
+        for level in 1..layout.num_levels() {
+            for (index, node) in layout.level_nodes(level).enumerate() {
+                let children: u64 = layout.children(node).map(|child| self.own(layout, child).error).sum();
+                let own = &mut self.levels[level as usize].items[index].point.error;
+                *own = children.max(*own);
+            }
+        }
+    }
+
+    /// What a node has that has one choice.
+    pub(super) fn own(&self, layout: &Layout, node: Node) -> Point {
+        self.of(layout, node)[0].point
     }
 
     pub(super) fn of(&self, layout: &Layout, node: Node) -> &[Choice] {
@@ -152,13 +173,16 @@ pub(super) struct Step {
 }
 
 impl Step {
+    /// Steeper than all others: something for nothing.
+    const FREE: Self = Self { bytes: 0, error: 1, to: Origin::Split(0) };
+
     /// The most error that a part of the step's bytes can save, whole units of it.
     pub(super) fn gain(&self, bytes: u64) -> u64 {
         (u128::from(self.error) * u128::from(bytes) / u128::from(self.bytes)) as u64
     }
 
     /// Steeper first.
-    fn by_slope(&self, other: &Self) -> Ordering {
+    pub(super) fn by_slope(&self, other: &Self) -> Ordering {
         let product = |error: u64, bytes: u64| u128::from(error) * u128::from(bytes);
         product(other.error, self.bytes).cmp(&product(self.error, other.bytes))
     }
@@ -207,6 +231,14 @@ impl Hull<'_> {
             None => false,
         };
         Some(self.steps.iter().take_while(fits).count())
+    }
+
+    /// The steepest way on from the node itself; none where nothing in it is better.
+    pub(super) fn slope_of_own(&self) -> Option<Step> {
+        match self.origin {
+            Origin::Own(_) => self.steps.first().copied(),
+            Origin::Split(_) => Some(Step::FREE),
+        }
     }
 
     pub(super) fn point(&self, vertex: usize) -> Point {

@@ -1,5 +1,6 @@
 //! Cuts within a budget of bytes: against exact optima, against one another, and where prices are strange.
 
+mod balanced;
 mod hard_cases;
 mod large;
 mod monotone;

@@ -166,7 +166,7 @@ impl VolumeData {
         let [low, high] = self.value_range();
         match dial {
             Dial::Tolerance(tolerance) => Some(tolerance * (high - low)),
-            Dial::Full | Dial::Error(_) | Dial::Deadline(_) => None,
+            Dial::Full | Dial::Error(_) | Dial::Deadline(_) | Dial::Memory(_) => None,
         }
     }
 

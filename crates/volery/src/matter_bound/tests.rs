@@ -168,6 +168,7 @@ fn pictures(scene: &Scene) -> Option<(MatterBound, [Image; 2])> {
         meshes: Vec::new().into(),
         transfer: Transfer::Values(transfer.clone()),
         dial: Dial::Full,
+        interest: [].into(),
         how: How::Raycast,
     };
     let source: &dyn NodeSource = &pyramid;

@@ -166,11 +166,17 @@ impl<D: Data> Session<D> {
     }
 
     /// The plan of a rung: 0 is the full resolution.
-    fn plan_of(&mut self, view: &View, rung: usize, place: usize) -> Result<Option<Plan>, RenderError> {
+    fn plan_of(
+        &mut self,
+        view: &View,
+        rung: usize,
+        place: usize,
+        backend: &dyn Backend,
+    ) -> Result<Option<Plan>, RenderError> {
         let full = View { dial: Dial::Full, ..view.clone() };
         let technique = &mut self.techniques[place].0;
         let view = if rung == 0 { Some(full) } else { technique.coarser(&full, rung) };
-        view.map(|view| technique.plan(&mut self.data, &view)).transpose()
+        view.map(|view| technique.plan(&mut self.data, &view, backend)).transpose()
     }
 
     /// The best plan whose bricks can be there in time, which rung it is, what was uploaded and the seconds of that.
@@ -183,14 +189,14 @@ impl<D: Data> Session<D> {
     ) -> Result<(Plan, usize, Uploaded, f64), RenderError> {
         let most_bytes = UPLOAD_SHARE * budget_secs / pace.secs_per_byte;
         let (mut rung, mut finer) = (0, None);
-        let mut plan = self.plan_of(view, rung, pace.place)?.ok_or(RenderError::NoFrame)?;
+        let mut plan = self.plan_of(view, rung, pace.place, backend)?.ok_or(RenderError::NoFrame)?;
         while self.missing_bytes(&plan, backend) as f64 > most_bytes {
-            let Some(coarser) = self.plan_of(view, rung + 1, pace.place)? else { break };
+            let Some(coarser) = self.plan_of(view, rung + 1, pace.place, backend)? else { break };
             finer = Some(std::mem::replace(&mut plan, coarser));
             rung += 1;
         }
         let start = Instant::now();
-        let mut uploaded = self.upload(&plan, backend)?;
+        let mut uploaded = self.upload(&plan, None, backend)?;
         if let (Some(Plan { store: Some((store, nodes)), .. }), Some(source)) = (&finer, self.data.bricks()) {
             let left = (most_bytes - uploaded.bytes as f64).max(0.0) as u64;
             uploaded += residency::prefetch(source, store, nodes, left, backend)?;
@@ -318,9 +324,9 @@ impl<D: Data> Session<D> {
         while let Step::Draw(part) = watch.control(|now| pace.scheduler.next(now)) {
             let begun = watch.elapsed();
             let (rung, shrink) = choices[part.level];
-            let plan = self.plan_of(view, rung, pace.place)?.ok_or(RenderError::NoFrame)?;
+            let plan = self.plan_of(view, rung, pace.place, backend)?.ok_or(RenderError::NoFrame)?;
             let planned = watch.elapsed();
-            uploaded += self.upload(&plan, backend)?;
+            uploaded += self.upload(&plan, None, backend)?;
             select_secs += planned - begun;
             upload_secs += watch.elapsed() - planned;
             let small = View {

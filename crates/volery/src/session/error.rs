@@ -4,6 +4,7 @@ use volery_frame::DrawError;
 use volery_frame::planes::MAX_PLANES;
 use volery_scene::{SampleType, camera, plane};
 
+use crate::interest::Interest;
 use crate::residency;
 use crate::technique::stack;
 use crate::view::{Deadline, Dial, Focus};
@@ -20,7 +21,7 @@ pub enum RenderError {
         found: &'static str,
     },
     /// A dial that the technique does not obey.
-    #[error("{technique}: dial is {dial:?}, expected {}", match *.technique { "stack" => "Full or Deadline", "fans" => "Full or Tolerance", _ => "Full, Tolerance or Deadline" })]
+    #[error("{technique}: dial is {dial:?}, expected {}", match *.technique { "stack" => "Full or Deadline", "fans" => "Full or Tolerance", _ => "Full, Tolerance, Error or Deadline" })]
     Dial {
         /// Name of the technique.
         technique: &'static str,
@@ -113,6 +114,26 @@ pub enum RenderError {
     MaxError {
         /// As given.
         found: f64,
+    },
+    /// A budget of memory that holds not even the coarsest cut.
+    #[error(
+        "memory is {found} bytes, expected at least {least}: the coarsest cut of this view takes that many"
+    )]
+    Memory {
+        /// As given.
+        found: u64,
+        /// What is needed on this backend.
+        least: u64,
+    },
+    /// A region of interest that is none, or that nothing reads.
+    #[error(
+        "{found:?} with dial {dial:?}, expected finite coordinates in order, a radius above 0, a weight of at least 0, and a budget of memory"
+    )]
+    Interest {
+        /// As given.
+        found: Interest,
+        /// Of the view.
+        dial: Dial,
     },
     /// A technique whose pictures are made at once.
     #[error("progressive: technique {technique}, expected plane")]

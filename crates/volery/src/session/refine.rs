@@ -1,7 +1,8 @@
 //! Pictures of one view, coarse at once and finer while the view rests (Schussman and Max 2001, section 8).
 //!
 //! Each picture allows half of the error of the one before, until the view's own tolerance is reached, or less than
-//! [`LEAST_TOLERANCE`]: then the view itself is drawn.
+//! [`LEAST_TOLERANCE`]: then the view itself is drawn. A view with a budget of memory is drawn at once: its pictures on
+//! the way could take more.
 
 use volery_frame::Backend;
 
@@ -37,7 +38,8 @@ impl Session<VolumeData> {
         backend: &'a mut dyn Backend,
     ) -> Result<Refinements<'a>, RenderError> {
         self.check(view)?;
-        let first = FIRST_TOLERANCE.max(own_tolerance(view));
+        let is_bounded = matches!(view.dial, Dial::Memory(_));
+        let first = if is_bounded { 0.0 } else { FIRST_TOLERANCE.max(own_tolerance(view)) };
         Ok(Refinements { session: self, backend, view: view.clone(), tolerance: Some(first) })
     }
 }

@@ -1,8 +1,8 @@
 //! From the world to the space of the data.
 //!
 //! A view is in the world; techniques, pyramids and backends know the space of the data alone, where sample `(i, j, k)`
-//! is at its index times the spacing. Here, and nowhere else, the one becomes the other: camera, planes, focus and
-//! meshes. Lengths are the same in both, so nothing else changes.
+//! is at its index times the spacing. Here, and nowhere else, the one becomes the other: camera, planes, focus, regions
+//! of interest and meshes. Lengths are the same in both, so nothing else changes.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -32,7 +32,9 @@ impl Space {
             other => other.clone(),
         };
         let camera = placement.camera_to_grid(&view.camera);
-        Cow::Owned(View { camera, meshes: self.meshes(placement, &view.meshes), how, ..view.clone() })
+        let interest = view.interest.iter().map(|interest| interest.moved(|point| placement.to_grid(point)));
+        let meshes = self.meshes(placement, &view.meshes);
+        Cow::Owned(View { camera, meshes, how, interest: interest.collect(), ..view.clone() })
     }
 
     fn meshes(&mut self, placement: &Placement, meshes: &[TriangleMesh]) -> Arc<[TriangleMesh]> {

@@ -34,7 +34,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
-use volery_frame::{Cube, Revision, Thickness, VolumeLayout};
+use volery_frame::{Backend, Cube, Revision, Thickness, VolumeLayout};
 use volery_octree::{Frustum, Viewpoint};
 use volery_pyramid::{CubeTree, Layout};
 use volery_scene::{Camera, Projection, Sample, TransferFunction, VoxelGrid, for_samples};
@@ -118,7 +118,7 @@ impl Technique<VolumeData> for Fans {
         self.tree_for(volume, volume.store());
     }
 
-    fn plan(&mut self, volume: &mut VolumeData, view: &View) -> Result<Plan, RenderError> {
+    fn plan(&mut self, volume: &mut VolumeData, view: &View, _: &dyn Backend) -> Result<Plan, RenderError> {
         let transfer = view.of_values()?;
         let store = volume.store_for(transfer);
         let tree = self.tree_for(volume, store);
@@ -159,7 +159,14 @@ impl Technique<VolumeData> for Fans {
             ..Work::default()
         };
         let drawing = Drawing::Cubes { revision, cubes, thickness };
-        Ok(Plan { drawing, store: Some((store, Vec::new())), work, bound_max: None, geometry_seconds: None })
+        Ok(Plan {
+            drawing,
+            store: Some((store, Vec::new())),
+            work,
+            bound_max: None,
+            predicted_rmse: None,
+            geometry_seconds: None,
+        })
     }
 
     fn truth(

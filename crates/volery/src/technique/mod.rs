@@ -11,8 +11,8 @@ pub mod stack;
 use std::sync::Arc;
 
 use volery_frame::{
-    BlendedBrick, Content, Cube, Cubes, JoinedBrick, Light, Planes, PointTransfer, RayTransfer, Rays,
-    Revision, Sampling, Sheet, SheetTransfer, Thickness,
+    Backend, BlendedBrick, Content, Cube, Cubes, JoinedBrick, Light, Planes, PointTransfer, RayTransfer,
+    Rays, Revision, Sampling, Sheet, SheetTransfer, Thickness,
 };
 use volery_pyramid::Node;
 use volery_scene::Plane;
@@ -54,8 +54,8 @@ pub trait Technique<D>: Send {
     /// Chooses what to draw of a view that was checked.
     ///
     /// # Errors
-    /// When there is nothing to choose from, or too much.
-    fn plan(&mut self, data: &mut D, view: &View) -> Result<Plan, RenderError>;
+    /// When there is nothing to choose from, or too much. `backend` says what bricks would take of its memory.
+    fn plan(&mut self, data: &mut D, view: &View, backend: &dyn Backend) -> Result<Plan, RenderError>;
 
     /// How far each pixel of what a view draws can be from the exact picture; `None` where that is not known.
     ///
@@ -89,6 +89,8 @@ pub struct Plan {
     pub work: Work,
     /// No channel of any pixel differs by more from the full resolution; `None` where that is not known.
     pub bound_max: Option<f64>,
+    /// What the picture is predicted to be off by from the full resolution; where a budget of memory asked for that.
+    pub predicted_rmse: Option<f64>,
     /// Seconds of planning that were slicing.
     pub geometry_seconds: Option<f64>,
 }

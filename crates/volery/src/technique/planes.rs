@@ -21,7 +21,7 @@
 //! itself (see `volery_frame::planes`).
 
 use glam::DVec3;
-use volery_frame::{BlendedBrick, PointTransfer, Revision, Sampling};
+use volery_frame::{Backend, BlendedBrick, PointTransfer, Revision, Sampling};
 use volery_io::World;
 use volery_octree::{
     Answer, Cut, CuttingPlanes, Filter, Focus, Frustum, IndexPlane, balance, certified, low_corners, section,
@@ -123,6 +123,7 @@ impl Planes {
             },
             store: Some((store, cut.nodes)),
             bound_max: Some(bound_max),
+            predicted_rmse: None,
             geometry_seconds: None,
         })
     }
@@ -156,6 +157,7 @@ impl Technique<VolumeData> for Planes {
     }
 
     fn check(&self, _: &VolumeData, view: &View) -> Result<(), RenderError> {
+        view.obeyed(|dial| !matches!(dial, Dial::Memory(_)))?;
         view.of_values()?;
         planes_of(view).map_or(Ok(()), PlaneView::check)
     }
@@ -164,7 +166,12 @@ impl Technique<VolumeData> for Planes {
         coarser_by_tolerance(view, rung)
     }
 
-    fn plan(&mut self, volume: &mut VolumeData, view: &View) -> Result<super::Plan, RenderError> {
+    fn plan(
+        &mut self,
+        volume: &mut VolumeData,
+        view: &View,
+        _: &dyn Backend,
+    ) -> Result<super::Plan, RenderError> {
         let default = PlaneView::default();
         let planes = planes_of(view).unwrap_or(&default);
         let chosen = choose(volume, view, planes);

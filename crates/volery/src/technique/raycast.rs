@@ -5,7 +5,8 @@
 //! the data tolerance it is drawn at its level; else its children are asked. That cut is kept: of it, a camera sees the
 //! nodes that are not outside its view, which are put in exact visibility order and become the bricks of a frame. Skipped nodes
 //! cost nothing: they are neither read nor resident nor drawn. With a tolerance the cut is balanced and joined
-//! ([`seams`](mod@volery_octree::seams)): rays meet one continuous field.
+//! ([`seams`](mod@volery_octree::seams)): rays meet one continuous field. With a budget of memory the cut is the view's
+//! own ([`memory`]).
 //!
 //! # Guarantees
 //! - Without a tolerance, and with a tolerance of 0, every node drawn is of the finest level.
@@ -20,11 +21,14 @@
 //! was asked for, and asks one pixel of sixteen as long as these are not good enough: so a smaller error has the cut
 //! of a larger one, refined. What is hidden, outside or of the colour of what is behind it stays coarse.
 
+mod losses;
+mod memory;
+
 use std::collections::HashSet;
 use std::sync::Arc;
 
 use glam::DVec3;
-use volery_frame::{JoinedBrick, RayTransfer, Revision};
+use volery_frame::{Backend, JoinedBrick, RayTransfer, Revision};
 use volery_octree::{
     Answer, Cut, DataTolerance, Filter, Frustum, Joined, Transparency, Viewpoint, front_to_back, joined,
     select,
@@ -33,6 +37,8 @@ use volery_pyramid::{Layout, Node, NodeSource};
 use volery_reference::Tracer;
 use volery_scene::TransferFunction;
 
+use self::losses::Losses;
+use self::memory::Choice;
 use crate::data::{Data, VolumeData};
 use crate::fit;
 use crate::matter_bound::{Drawn, MatterBound, Search};
@@ -49,6 +55,9 @@ pub(crate) struct Raycast {
     cuts: Cuts,
     /// Of the last view with an error.
     certified: Kept<(View, Revision), (Arc<Joined>, f64)>,
+    losses: Kept<(TransferFunction, Revision), Losses>,
+    /// The last view with a budget of memory.
+    last_within: Option<(View, Plan)>,
 }
 
 /// Pixels along an axis of which one says what is too coarse.
@@ -98,52 +107,37 @@ impl Technique<VolumeData> for Raycast {
         coarser_by_tolerance(view, rung)
     }
 
-    fn plan(&mut self, volume: &mut VolumeData, view: &View) -> Result<Plan, RenderError> {
+    fn plan(
+        &mut self,
+        volume: &mut VolumeData,
+        view: &View,
+        backend: &dyn Backend,
+    ) -> Result<Plan, RenderError> {
+        let Dial::Memory(max_bytes) = view.dial else { return self.plan_without_backend(volume, view) };
         let transfer = view.of_values()?;
         let store = volume.store_for(transfer);
-        let layout = &store.layout;
-        let source = volume.source();
-        let table = self.table.get(&(transfer.clone(), layout.revision), || {
-            let table = RayTransfer::new(transfer, layout);
-            let is_rounded = store.encoding.blurs(transfer, source.sample_type());
-            if is_rounded { table.of_rounded_texels() } else { table }
-        });
-        let nodes = source.layout();
-        let (seen, bound_max) = match view.dial {
-            Dial::Error(error) if error > 0.0 => {
-                let (seen, bound) = self.certified(volume, (view, transfer), &store, error)?;
-                (seen, Some(bound))
-            }
-            _ => {
-                let tolerance = volume.tolerance(view.dial).unwrap_or(0.0);
-                let cut = self.cuts.of(tolerance);
-                (
-                    cut.get(&(transfer.clone(), layout.revision), || tolerant(source, transfer, tolerance)),
-                    None,
-                )
-            }
-        };
-        let (in_view, bricks) = in_view(nodes, view, &seen);
-        let order = front_to_back(nodes, &in_view, Viewpoint::of(&view.camera, nodes));
-        let bricks = order.iter().map(|&place| bricks[place]).collect();
-        let ordered = order.iter().map(|&place| in_view[place]).collect();
-        let in_view = Cut { nodes: in_view, skipped: Vec::new() };
-        Ok(Plan {
-            drawing: Drawing::Rays { transfer: table, bricks },
-            work: Work { nodes_by_level: Some(in_view.nodes_by_level()), ..Work::default() },
-            store: Some((store, ordered)),
-            bound_max,
-            geometry_seconds: None,
-        })
+        let choice = Choice { source: volume.source(), store: &store, transfer, view, backend };
+        let (seen, predicted) = self.within(volume, &choice, max_bytes)?;
+        let plan =
+            Plan { predicted_rmse: Some(predicted), ..self.plan_of(volume, (view, transfer), &store, &seen) };
+        self.last_within = Some((view.clone(), plan.clone()));
+        Ok(plan)
     }
 
     fn bound(&mut self, volume: &mut VolumeData, view: &View) -> Result<Option<MatterBound>, RenderError> {
-        // What rays far apart leave out is not known.
-        if matches!(view.dial, Dial::Deadline(_)) {
+        let plan = match view.dial {
+            // What rays far apart leave out is not known.
+            Dial::Deadline(_) => None,
+            // What a backend would hold is known once it was asked.
+            Dial::Memory(_) => self.last_within.clone().filter(|(of, _)| of == view).map(|(_, plan)| plan),
+            Dial::Full | Dial::Tolerance(_) | Dial::Error(_) => {
+                Some(self.plan_without_backend(volume, view)?)
+            }
+        };
+        let Some(Plan { drawing: Drawing::Rays { bricks, .. }, store: Some((store, nodes)), .. }) = plan
+        else {
             return Ok(None);
-        }
-        let Plan { drawing, store, .. } = self.plan(volume, view)?;
-        let (Drawing::Rays { bricks, .. }, Some((store, nodes))) = (drawing, store) else { return Ok(None) };
+        };
         let transfer = view.of_values()?;
         let drawn = Drawn { view, transfer, source: volume.source(), store: &store };
         Ok(Some(drawn.bound(&nodes, &bricks).map_err(residency::Error::from)?))
@@ -160,6 +154,84 @@ impl Technique<VolumeData> for Raycast {
 }
 
 impl Raycast {
+    /// The plan of a view whose dial asks no backend.
+    fn plan_without_backend(&mut self, volume: &mut VolumeData, view: &View) -> Result<Plan, RenderError> {
+        let transfer = view.of_values()?;
+        let store = volume.store_for(transfer);
+        let (seen, bound_max) = match view.dial {
+            Dial::Error(error) if error > 0.0 => {
+                let (seen, bound) = self.certified(volume, (view, transfer), &store, error)?;
+                (seen, Some(bound))
+            }
+            dial => {
+                let tolerance = volume.tolerance(dial).unwrap_or(0.0);
+                (self.tolerant(volume.source(), transfer, store.layout.revision, tolerance), None)
+            }
+        };
+        Ok(Plan { bound_max, ..self.plan_of(volume, (view, transfer), &store, &seen) })
+    }
+
+    /// The plan of a cut.
+    fn plan_of(
+        &mut self,
+        volume: &VolumeData,
+        (view, transfer): (&View, &TransferFunction),
+        store: &Store,
+        seen: &Joined,
+    ) -> Plan {
+        let source = volume.source();
+        let table = self.table.get(&(transfer.clone(), store.layout.revision), || {
+            let table = RayTransfer::new(transfer, &store.layout);
+            let is_rounded = store.encoding.blurs(transfer, source.sample_type());
+            if is_rounded { table.of_rounded_texels() } else { table }
+        });
+        let nodes = source.layout();
+        let (in_view, bricks) = in_view(nodes, view, seen);
+        let order = front_to_back(nodes, &in_view, Viewpoint::of(&view.camera, nodes));
+        let bricks = order.iter().map(|&place| bricks[place]).collect();
+        let ordered = order.iter().map(|&place| in_view[place]).collect();
+        let in_view = Cut { nodes: in_view, skipped: Vec::new() };
+        Plan {
+            drawing: Drawing::Rays { transfer: table, bricks },
+            work: Work { nodes_by_level: Some(in_view.nodes_by_level()), ..Work::default() },
+            store: Some((*store, ordered)),
+            bound_max: None,
+            predicted_rmse: None,
+            geometry_seconds: None,
+        }
+    }
+
+    /// The kept cut of a tolerance, in data units.
+    fn tolerant(
+        &mut self,
+        source: &dyn NodeSource,
+        transfer: &TransferFunction,
+        revision: Revision,
+        tolerance: f64,
+    ) -> Arc<Joined> {
+        let kept = self.cuts.of(tolerance);
+        kept.get(&(transfer.clone(), revision), || tolerant(source, transfer, tolerance))
+    }
+
+    /// The best cut within a budget of memory, the full resolution if that fits, and the rmse that is predicted of it.
+    fn within(
+        &mut self,
+        volume: &VolumeData,
+        choice: &Choice<'_>,
+        max_bytes: u64,
+    ) -> Result<(Arc<Joined>, f64), RenderError> {
+        let Choice { source, transfer, view, .. } = *choice;
+        let revision = choice.store.layout.revision;
+        let full = self.tolerant(source, transfer, revision, 0.0);
+        if choice.fits(&in_view(source.layout(), view, &full).0, max_bytes) {
+            return Ok((full, 0.0));
+        }
+        let key = (transfer.clone(), revision);
+        let losses = self.losses.get(&key, || Losses::measure(volume.grid(), source, transfer));
+        let (joined, mean_square) = choice.cut(&losses, max_bytes)?;
+        Ok((Arc::new(joined), mean_square.sqrt()))
+    }
+
     /// The cut of which no pixel is off by more than an error, and the largest that any is.
     fn certified(
         &mut self,

@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use volery_frame::{Counted, Light, Revision, Sheet, SheetTransfer, SheetVertices, Sheets};
+use volery_frame::{Backend, Counted, Light, Revision, Sheet, SheetTransfer, SheetVertices, Sheets};
 use volery_reference::GridTracer;
 use volery_scene::mesh::AMBIENT;
 use volery_scene::{Camera, Projection, Samples};
@@ -117,7 +117,7 @@ impl Technique<GridData> for OfGrid {
         self.stacks.forget_immediate();
     }
 
-    fn plan(&mut self, grid: &mut GridData, view: &View) -> Result<Plan, RenderError> {
+    fn plan(&mut self, grid: &mut GridData, view: &View, _: &dyn Backend) -> Result<Plan, RenderError> {
         let start = Instant::now();
         let default = StackView::default();
         let stack_view = if let How::Stack(of_view) = &view.how { of_view } else { &default };
@@ -166,7 +166,7 @@ impl Technique<StackData> for OfStack {
         if needs_gradients(view) && !stack.has_gradients() { Err(RenderError::NoGradients) } else { Ok(()) }
     }
 
-    fn plan(&mut self, stack: &mut StackData, view: &View) -> Result<Plan, RenderError> {
+    fn plan(&mut self, stack: &mut StackData, view: &View, _: &dyn Backend) -> Result<Plan, RenderError> {
         Ok(plan(stack.stack(), &mut self.drawn, view, stack.value_range()))
     }
 
@@ -244,7 +244,7 @@ fn plan(stack: &Arc<Stack>, drawn: &mut Drawn, view: &View, range: [f64; 2]) -> 
         transfer,
         light: is_lit(view).then(|| Light::along_view(&view.camera, AMBIENT as f32)),
     };
-    Plan { drawing, store: None, work, bound_max: None, geometry_seconds: None }
+    Plan { drawing, store: None, work, bound_max: None, predicted_rmse: None, geometry_seconds: None }
 }
 
 /// Slices and strips of the outline between them.

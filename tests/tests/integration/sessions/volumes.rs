@@ -230,6 +230,18 @@ impl Backend for Narrow {
         self.bricks.lock().unwrap().len() as u64
     }
 
+    fn brick_bytes(&self, _: &VolumeLayout, _: [u32; 3]) -> u64 {
+        1
+    }
+
+    fn room(&self, _: &VolumeLayout, max_bytes: u64) -> u64 {
+        max_bytes
+    }
+
+    fn reserve(&mut self, _: usize, _: u64) -> Result<(), UploadError> {
+        Ok(())
+    }
+
     fn uploaded_bytes(&self) -> UploadedBytes {
         UploadedBytes::default()
     }

@@ -126,7 +126,7 @@ impl Progressive<'_> {
         let select = start.elapsed().as_secs_f64();
         let start = Instant::now();
         // Where the backend's memory was full, it may have forgotten what is shown.
-        uploaded += self.session.upload(&plan, self.backend)?;
+        uploaded += self.session.upload(&plan, None, self.backend)?;
         let drawn = self.session.draw(&self.local, &plan, self.backend)?;
         let draw = start.elapsed().as_secs_f64();
         let times = [Times { select, geometry: None, upload: Some(upload), draw, paced: None }];
