@@ -141,12 +141,15 @@ fn nrrd_in_lps(grid: &VoxelGrid) -> Vec<u8> {
     [head.into_bytes(), bytes(grid)].concat()
 }
 
+/// Makes a file of a volume.
+type Writer = fn(&VoxelGrid) -> Vec<u8>;
+
 /// Reads a file as the program does.
-fn opened(name: &str, file: &[u8]) -> Result<VolumeData, InputError> {
+fn opened(name: &str, file: &[u8]) -> Result<VolumeData, Box<InputError>> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, file).unwrap();
-    read_input(&path, None)?.volume_data()
+    Ok(read_input(&path, None)?.volume_data()?)
 }
 
 /// What stands where in the world: a screen beside the head, planes, a focus.
@@ -224,8 +227,7 @@ fn files_in_any_order_show_one_head(choice: BackendChoice, test: &str) {
     let exact_pictures = truths(&mut session, &backend);
     assert_not_mirrored_by_chance(&expected[0].1);
     let (yes, no) = (true, false);
-    let formats: [(&str, fn(&VoxelGrid) -> Vec<u8>); 3] =
-        [("a.nii", nifti), ("a.mha", metaimage), ("a.nrrd", nrrd_in_lps)];
+    let formats: [(&str, Writer); 3] = [("a.nii", nifti), ("a.mha", metaimage), ("a.nrrd", nrrd_in_lps)];
     for (number, (name, from, is_back)) in [
         ("LAS", [0, 1, 2], [yes, no, no]),
         ("LPS", [0, 1, 2], [yes, yes, no]),
