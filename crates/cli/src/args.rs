@@ -153,7 +153,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, help_heading = "Output", value_name = "OUT.png",
         value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["png", "exr"])))]
     pub(crate) error_map: Option<PathBuf>,
-    /// Write how far each pixel can be from the exact picture, computed without it and amplified as printed; of raycast
+    /// Write how far coarse data can put each pixel off, computed without the exact picture and amplified as printed; of
+    /// raycast
     #[arg(long, help_heading = "Output", value_name = "OUT.png",
         value_parser = PathBufValueParser::new().try_map(|path| with_ending(path, &["png", "exr"])))]
     pub(crate) bound_map: Option<PathBuf>,
