@@ -28,7 +28,7 @@ pub mod histogram;
 pub mod info;
 mod input;
 mod interest;
-mod matter_bound;
+pub mod matter_bound;
 pub mod output;
 mod path;
 mod ray_budget;

@@ -6,7 +6,7 @@
 //! nodes that are not outside its view, which are put in exact visibility order and become the bricks of a frame. Skipped nodes
 //! cost nothing: they are neither read nor resident nor drawn. With a tolerance the cut is balanced and joined
 //! ([`seams`](mod@volery_octree::seams)): rays meet one continuous field. With a budget of memory the cut is the view's
-//! own ([`memory`]).
+//! own (`raycast/memory.rs`).
 //!
 //! # Guarantees
 //! - Without a tolerance, and with a tolerance of 0, every node drawn is of the finest level.
