@@ -61,7 +61,7 @@ impl Balanced {
         walk.point.bytes
     }
 
-    /// A balanced cut within `max_bytes`; see the [module](self).
+    /// A balanced cut within `max_bytes`.
     ///
     /// # Errors
     /// When the budget is below [`min_bytes`](Self::min_bytes).
