@@ -57,7 +57,6 @@ fn wrong_command_lines_are_status_2() {
         ("render waves.nrrd -o a.png --frames 0", &["--frames"]),
         ("render waves.nrrd -o a.png --threads 0", &["--threads"]),
         ("render waves.nrrd -o a.png --error 2", &["0 to 1"]),
-        ("render waves.nrrd -o a.png --technique fans --error 0.1", &["error", "fans"]),
         ("render waves.nrrd -o a.png --technique fans --show-nodes", &["--show-nodes", "plane"]),
         ("render waves.nrrd -o a.png --thickness exact", &["--thickness", "fans"]),
         ("render waves.nrrd -o a.png --plane 1,2,3", &["NX,NY,NZ,D"]),

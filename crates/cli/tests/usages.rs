@@ -237,9 +237,7 @@ fn what_a_file_cannot_answer_is_refused() {
 #[test]
 fn an_option_that_changes_the_technique_says_so() {
     let shop = Workshop::new();
-    for option in
-        ["--focus 1,2,3", "--nearest", "--error 0.1", "--plane 0,0,1,9", "--transparent", "--show-nodes"]
-    {
+    for option in ["--focus 1,2,3", "--nearest", "--plane 0,0,1,9", "--transparent", "--show-nodes"] {
         let said = shop.done(&format!("render waves.nrrd -o a.png --size 9x9 {option}")).stdout;
         let name = option.split(' ').next().expect("an option with a name");
         assert!(
@@ -248,4 +246,7 @@ fn an_option_that_changes_the_technique_says_so() {
         );
     }
     assert!(!shop.done("render waves.nrrd -o a.png --size 9x9").stdout.contains("note:"));
+    // Rays obey it too.
+    let said = shop.done("render waves.nrrd -o a.png --size 9x9 --error 0.1").stdout;
+    assert!(said.contains("raycast") && said.contains("bound: ") && !said.contains("drawn by"), "{said}");
 }

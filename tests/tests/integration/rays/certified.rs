@@ -19,7 +19,7 @@ by_both_backends! {
 /// What backends add, at most: see `docs/rays.md`.
 const DRAWING: f64 = 0.004;
 
-const SIZE: [u32; 2] = [48, 40];
+const SIZE: [u32; 2] = [30, 25];
 
 fn grid(dims: [usize; 3], value: impl Fn([usize; 3]) -> f32) -> VoxelGrid {
     VoxelGrid::new(dims, DVec3::new(1.0, 0.9, 1.2), volery_data::fill(dims, value)).expect("a grid")
