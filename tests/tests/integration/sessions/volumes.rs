@@ -390,7 +390,6 @@ fn what_a_technique_does_not_obey_is_refused() {
         error
     };
     let dial = Dial::Error(0.1);
-    assert!(matches!(fails(How::Raycast, dial), RenderError::Dial { technique: "raycast", .. }));
     assert!(matches!(fails(How::Fans(Thickness::Exact), dial), RenderError::Dial { technique: "fans", .. }));
     let stack = How::Stack(volery::StackView::default());
     assert!(matches!(fails(stack, Dial::Full), RenderError::OtherData { found: "volume", .. }));
