@@ -73,42 +73,47 @@ impl MatterBound {
     }
 }
 
-/// What is bounded: nodes, and their bricks as they are drawn.
-pub(crate) struct Drawn<'a> {
-    pub(crate) view: &'a View,
-    pub(crate) transfer: &'a TransferFunction,
-    pub(crate) source: &'a dyn NodeSource,
-    pub(crate) store: &'a Store,
-}
-
-impl Drawn<'_> {
-    /// The bound of a picture of these nodes, whose bricks are drawn so.
-    pub(crate) fn bound(&self, nodes: &[Node], bricks: &[JoinedBrick]) -> Result<MatterBound, ReadError> {
-        Search::new(self).bound(nodes, bricks)
-    }
-}
-
-/// Bounds of one view with several cuts.
+/// Bounds of one view with one cut or several.
 pub(crate) struct Search<'a> {
-    drawn: &'a Drawn<'a>,
+    view: &'a View,
+    transfer: &'a TransferFunction,
+    source: &'a dyn NodeSource,
+    store: &'a Store,
     colors: Colors,
     known: Known,
 }
 
+/// The largest bound so far, and pixels that may be near it: their bounds, and what nodes may change in them.
+#[derive(Default)]
+struct Worst {
+    most: f64,
+    pixels: Vec<(f64, Vec<(u32, f64)>)>,
+}
+
+impl Worst {
+    /// Keeps what is above a share of the largest.
+    fn keep(&mut self, share: f64) {
+        self.pixels.retain(|(bound, _)| *bound > share * self.most);
+    }
+}
+
 impl<'a> Search<'a> {
-    pub(crate) fn new(drawn: &'a Drawn<'a>) -> Self {
-        let colors = Colors::new(drawn.transfer, drawn.store.layout.value_offset);
-        Self { drawn, colors, known: Known::new() }
+    pub(crate) fn new(
+        (view, transfer): (&'a View, &'a TransferFunction),
+        (source, store): (&'a dyn NodeSource, &'a Store),
+    ) -> Self {
+        let colors = Colors::new(transfer, store.layout.value_offset);
+        Self { view, transfer, source, store, colors, known: Known::new() }
     }
 
     fn field(&mut self, nodes: &[Node], bricks: &[JoinedBrick]) -> Result<Field, ReadError> {
-        let Drawn { transfer, source, store, .. } = *self.drawn;
-        Field::new((source, store), (nodes, bricks), transfer, &mut self.known)
+        Field::new((self.source, self.store), (nodes, bricks), self.transfer, &mut self.known)
     }
 
+    /// The bound of a picture of these nodes, whose bricks are drawn so.
     pub(crate) fn bound(&mut self, nodes: &[Node], bricks: &[JoinedBrick]) -> Result<MatterBound, ReadError> {
         let field = self.field(nodes, bricks)?;
-        let (view, colors) = (self.drawn.view, &self.colors);
+        let (view, colors) = (self.view, &self.colors);
         let View { width, height, .. } = *view;
         let grid = view.camera.rays(width, height);
         let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
@@ -131,24 +136,33 @@ impl<'a> Search<'a> {
         (step, share): (u32, f64),
     ) -> Result<(Vec<bool>, f64), ReadError> {
         let field = self.field(nodes, bricks)?;
-        let (view, colors) = (self.drawn.view, &self.colors);
+        let (view, colors) = (self.view, &self.colors);
         let grid = view.camera.rays(view.width, view.height);
         let rows: Vec<u32> = (step / 2..view.height).step_by(step as usize).collect();
         let columns: Vec<u32> = (step / 2..view.width).step_by(step as usize).collect();
-        let pixels: Vec<(f64, Vec<(u32, f64)>)> = rows
-            .into_par_iter()
-            .map_init(
-                || Walker::new(&field, colors, view),
-                |walker, y| columns.iter().map(|&x| walker.causes(&grid.pixel(x, y))).collect::<Vec<_>>(),
-            )
-            .flatten()
-            .collect();
-        let most = pixels.iter().map(|(bound, _)| *bound).fold(0.0, f64::max);
-        let mut too_coarse = vec![false; nodes.len()];
-        for (bound, mut causes) in pixels {
-            if bound <= share * most {
-                continue;
+        let row = |walker: &mut Walker<'_>, y: u32| {
+            let mut worst = Worst::default();
+            for &x in &columns {
+                let (bound, causes) = walker.causes(&grid.pixel(x, y));
+                worst.most = worst.most.max(bound);
+                if bound > share * worst.most {
+                    worst.pixels.push((bound, causes));
+                }
             }
+            worst.keep(share);
+            worst
+        };
+        let Worst { most, pixels } = rows
+            .into_par_iter()
+            .map_init(|| Walker::new(&field, colors, view), |walker, y| row(walker, y))
+            .reduce(Worst::default, |mut a, b| {
+                a.most = a.most.max(b.most);
+                a.pixels.extend(b.pixels);
+                a.keep(share);
+                a
+            });
+        let mut too_coarse = vec![false; nodes.len()];
+        for (_, mut causes) in pixels {
             causes.sort_by(|(a, x), (b, y)| y.total_cmp(x).then(a.cmp(b)));
             let mut left: f64 = causes.iter().map(|(_, change)| change).sum();
             for (place, change) in causes {

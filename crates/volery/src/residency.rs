@@ -56,10 +56,8 @@ pub(crate) fn upload(
     nodes: &[Node],
     backend: &mut dyn Backend,
 ) -> Result<Uploaded, Error> {
-    let Store { layout, encoding } = store;
-    if backend.volume() != Some(layout.revision) {
-        backend.set_volume(layout)?;
-    }
+    let encoding = &store.encoding;
+    choose_volume(store, backend)?;
     match upload_missing(source, encoding, nodes, BATCH_BYTES, backend) {
         Err(Error::Upload(UploadError::PoolFull { .. })) => {
             evict_others(source.layout(), nodes, backend);
@@ -78,17 +76,23 @@ pub(crate) fn upload_within(
     max_bytes: u64,
     backend: &mut dyn Backend,
 ) -> Result<Uploaded, Error> {
-    let Store { layout, encoding } = store;
-    if backend.volume() != Some(layout.revision) {
-        backend.set_volume(layout)?;
-    }
+    choose_volume(store, backend)?;
     evict_others(source.layout(), nodes, backend);
     backend.reserve(nodes.len(), max_bytes)?;
-    // At most brick_cells + 1 samples, which fits.
-    let samples = |node: Node| source.layout().brick_shape(node).count.map(|n| n as u32);
-    let all: u64 = nodes.iter().map(|&node| backend.brick_bytes(layout, samples(node))).sum();
+    let all: u64 = nodes.iter().map(|&node| device_bytes(source, store, node, backend)).sum();
     let left = usize::try_from(max_bytes.saturating_sub(all)).unwrap_or(BATCH_BYTES);
-    upload_missing(source, encoding, nodes, left.min(BATCH_BYTES), backend)
+    upload_missing(source, &store.encoding, nodes, left.min(BATCH_BYTES), backend)
+}
+
+/// Bytes of the backend's memory that a node's brick takes.
+pub(crate) fn device_bytes(source: &dyn NodeSource, store: &Store, node: Node, backend: &dyn Backend) -> u64 {
+    // At most brick_cells + 1 samples, which fits.
+    let samples = source.layout().brick_shape(node).count.map(|n| n as u32);
+    backend.brick_bytes(&store.layout, samples)
+}
+
+fn choose_volume(store: &Store, backend: &mut dyn Backend) -> Result<(), UploadError> {
+    if backend.volume() == Some(store.layout.revision) { Ok(()) } else { backend.set_volume(&store.layout) }
 }
 
 /// Bytes of texels of the nodes whose bricks are not resident, were all bricks whole.

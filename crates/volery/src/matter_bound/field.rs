@@ -49,16 +49,18 @@ pub(super) struct Field {
     /// Of each finest brick, the node that shows it, and one more.
     owners: Vec<u32>,
     nodes: Vec<Arc<Node>>,
-    /// How far texels may be from samples.
-    pub(super) rounding: f64,
+    /// How far texels may be from samples, relative to their distance from the store's offset.
+    rounding: f64,
 }
 
 /// A cell that a ray goes through.
 pub(super) struct Cell {
     /// Values at its corners, x fastest.
     pub(super) corners: [f64; 8],
-    /// Least and largest difference of the exact field from the drawn one in it, texels aside: not above 0, and not below.
+    /// Least and largest difference of the exact field from the drawn one in it: not above 0, and not below.
     pub(super) error: [f64; 2],
+    /// What both may be off by where texels are rounded otherwise than here.
+    pub(super) margin: f64,
 }
 
 impl Field {
@@ -92,17 +94,10 @@ impl Field {
             let is_clear = joined.seams == 0 && transfer.is_transparent(stats.min, stats.max);
             Node::read((source, store), (node, joined), is_clear).map(Arc::new)
         };
-        let read = names.par_iter().zip(bricks).map(node).collect::<Result<Vec<_>, ReadError>>()?;
+        let nodes = names.par_iter().zip(bricks).map(node).collect::<Result<Vec<_>, ReadError>>()?;
         let keys = names.iter().zip(bricks).map(|(&name, brick)| (name, brick.seams));
-        *known = keys.zip(read.iter().cloned()).collect();
-        let nodes = read;
-        let rounding = if layout.texel == TexelType::F32 {
-            let farthest = nodes.iter().flat_map(|node| &node.samples).filter(|x| x.is_finite());
-            let farthest = farthest.fold(0.0_f32, |most, x| most.max(x.abs()));
-            f64::from(farthest) * f64::from(f32::EPSILON)
-        } else {
-            0.0
-        };
+        *known = keys.zip(nodes.iter().cloned()).collect();
+        let rounding = if layout.texel == TexelType::F32 { f64::from(f32::EPSILON) } else { 0.0 };
         let spacing = layout.spacing.to_array();
         let log_brick = layout.brick_cells.ilog2();
         Ok(Self { cells, spacing, log_brick, bricks: num, owners, nodes, rounding })
@@ -111,6 +106,15 @@ impl Field {
     /// The node that shows a finest cell.
     pub(super) fn node(&self, cell: [i64; 3]) -> Option<&Node> {
         self.place(cell).map(|place| &*self.nodes[place])
+    }
+
+    /// The cell of one of the nodes that holds a finest cell; none where there is no matter in it.
+    pub(super) fn cell(&self, node: &Node, finest: [i64; 3]) -> Option<Cell> {
+        let (corners, error) = node.cell(finest)?;
+        let farthest = corners.iter().chain(&error).fold(0.0_f64, |most, value| most.max(value.abs()));
+        // Where there may be anything a margin says nothing; of whole numbers it is what f64 may be off by.
+        let margin = if farthest.is_finite() { self.rounding.max(1e-12) * farthest } else { 0.0 };
+        Some(Cell { corners, error, margin })
     }
 
     /// The place among all of the node that shows a finest cell.
@@ -283,7 +287,7 @@ impl Node {
     }
 
     /// The cell of the node that holds a finest cell; none where there is no matter in it.
-    pub(super) fn cell(&self, finest: [i64; 3]) -> Option<Cell> {
+    fn cell(&self, finest: [i64; 3]) -> Option<([f64; 8], [f64; 2])> {
         let [x, y, z] =
             std::array::from_fn(|axis| ((finest[axis] - self.first_cell[axis]) >> self.level) as usize);
         let corners = self.corners([x, y, z]);
@@ -291,9 +295,9 @@ impl Node {
         let error = self.errors.get(place).map_or([0.0; 2], |error| error.map(f64::from));
         if corners.iter().any(|value| value.is_nan()) {
             // Nothing is drawn; there may be anything.
-            return error[1].is_infinite().then_some(Cell { corners: [0.0; 8], error });
+            return error[1].is_infinite().then_some(([0.0; 8], error));
         }
-        Some(Cell { corners, error })
+        Some((corners, error))
     }
 }
 

@@ -61,11 +61,7 @@ impl<'a> Walker<'a> {
         self.clear = 1.0;
         self.cut(ray);
         self.look_behind();
-        self.sum().map(|bound| if bound > 0.0 { (bound * (1.0 + ROUNDING)) as f32 } else { 0.0 }).map(
-            |bound| {
-                if bound > 0.0 { bound.next_up() } else { 0.0 }
-            },
-        )
+        self.sum().map(|bound| if bound > 0.0 { ((bound * (1.0 + ROUNDING)) as f32).next_up() } else { 0.0 })
     }
 
     /// The bound of a ray, and what the nodes that it meets may change, by their places.
@@ -146,15 +142,13 @@ impl<'a> Walker<'a> {
 
     /// Adds the pieces of a cell, from one place in it to another.
     fn add(&mut self, node: &Node, finest: [i64; 3], [from, to]: [[f64; 3]; 2], length: f64) {
-        let Some(cell) = node.cell(finest) else { return };
+        let Some(cell) = self.field.cell(node, finest) else { return };
         let place = self.field.place(finest).unwrap_or(0) as u32;
         let all = range(&cell.corners);
-        // What is drawn may be rounded otherwise than here.
-        let margin = self.field.rounding + 1e-12 * (all[1] - all[0]);
-        let run = self.colors.run(all[0] + cell.error[0] - margin, all[1] + cell.error[1] + margin);
+        let run = self.colors.run(all[0] + cell.error[0] - cell.margin, all[1] + cell.error[1] + cell.margin);
         if self.colors.seen(run).extinction()[1] > 0.0 {
             let cubic = bernstein(&cell.corners, [from, to]);
-            self.add_pieces((place, cell.error, margin), &cubic, length, 0);
+            self.add_pieces((place, cell.error, cell.margin), &cubic, length, 0);
         }
     }
 

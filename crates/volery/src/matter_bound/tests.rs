@@ -124,7 +124,7 @@ fn drawn(field: &Field, grid: &VoxelGrid, offset: f64) -> VoxelGrid {
         let size = 1_i64 << node.level;
         let low = cell.map(|cell| cell / size * size);
         let share = std::array::from_fn(|axis| (place[axis] - low[axis]) as f64 / size as f64);
-        offset + field::trilinear(&node.cell(cell).expect("no blanks").corners, share)
+        offset + field::trilinear(&field.cell(node, cell).expect("no blanks").corners, share)
     };
     VoxelGrid::new(grid.dims(), grid.spacing(), Samples::from(volery_data::fill(grid.dims(), value)))
         .expect("as before")
@@ -172,8 +172,8 @@ fn pictures(scene: &Scene) -> Option<(MatterBound, [Image; 2])> {
         how: How::Raycast,
     };
     let source: &dyn NodeSource = &pyramid;
-    let drawn_cut = Drawn { view: &view, transfer, source, store: &store };
-    let bound = drawn_cut.bound(&cut.nodes, &bricks).expect("in memory");
+    let bound =
+        Search::new((&view, transfer), (source, &store)).bound(&cut.nodes, &bricks).expect("in memory");
     let field =
         Field::new((source, &store), (&cut.nodes, &bricks), transfer, &mut Known::new()).expect("in memory");
     // Cells of nodes without anything to be seen are not kept.
@@ -230,4 +230,30 @@ fn no_pixel_differs_by_more_than_its_bound() {
         ratios[ratios.len() * 9 / 10]
     );
     assert!(num_coarse > 300 && median < 10.0);
+}
+
+#[test]
+fn an_outlier_loosens_no_bound_elsewhere() {
+    let dims = [25, 22, 24];
+    let wave = |[x, y, z]: [usize; 3]| {
+        ((0.7 * x as f32).sin() + (0.6 * y as f32 + 0.3 * z as f32).cos()) * 0.25 + 0.5
+    };
+    let point = |value, opacity| ControlPoint { value, color: [0.2, 0.6, 0.9], opacity };
+    let rms = |outlier: f32| {
+        let values = volery_data::fill(dims, |p| if p == [0; 3] { outlier } else { wave(p) });
+        let grid = VoxelGrid::new(dims, DVec3::ONE, Samples::from(values)).expect("a grid");
+        let transfer =
+            TransferFunction::new(vec![point(0.3, 0.0), point(0.9, 0.2)], 1.0).expect("points in order");
+        let camera = Camera::fitted(DVec3::new(24.0, 21.0, 23.0), 35.0, 22.0, 1.0, false);
+        let scene = Scene { grid, transfer, camera, background: [0.1, 0.5, 0.9], tolerance: 0.3 };
+        let (bound, _) = pictures(&scene).expect("nothing is clear");
+        bound.rms()
+    };
+    let plain = rms(wave([0; 3]));
+    assert!(plain > 1e-4, "{plain}: something is coarse");
+    for outlier in [-1e6, -1e20, 1e30] {
+        let found = rms(outlier);
+        println!("outlier {outlier:e}: rms of the bound {found:.5}, at most 1.2 of {plain:.5}");
+        assert!(found <= 1.2 * plain);
+    }
 }

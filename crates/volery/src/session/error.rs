@@ -151,7 +151,7 @@ pub enum RenderError {
     #[error(transparent)]
     Stack(#[from] stack::Error),
     /// Nobody knows how far a picture can be from the exact one.
-    #[error("bounds of pixels are known of raycast in full resolution and with a tolerance, found {technique}{}", if *.has_deadline { " with a deadline" } else { "" })]
+    #[error("bounds of pixels are known of raycast without a deadline, found {technique}{}", if *.has_deadline { " with a deadline" } else { "" })]
     NoBound {
         /// What draws.
         technique: &'static str,

@@ -41,7 +41,7 @@ use self::losses::Losses;
 use self::memory::Choice;
 use crate::data::{Data, VolumeData};
 use crate::fit;
-use crate::matter_bound::{Drawn, MatterBound, Search};
+use crate::matter_bound::{MatterBound, Search};
 use crate::residency::{self, Numbers, Store};
 use crate::session::{RenderError, VerifyError};
 use crate::technique::{Drawing, Kept, Plan, Technique, Work};
@@ -139,8 +139,8 @@ impl Technique<VolumeData> for Raycast {
             return Ok(None);
         };
         let transfer = view.of_values()?;
-        let drawn = Drawn { view, transfer, source: volume.source(), store: &store };
-        Ok(Some(drawn.bound(&nodes, &bricks).map_err(residency::Error::from)?))
+        let mut search = Search::new((view, transfer), (volume.source(), &store));
+        Ok(Some(search.bound(&nodes, &bricks).map_err(residency::Error::from)?))
     }
 
     fn truth(
@@ -246,8 +246,7 @@ impl Raycast {
         }
         let source = volume.source();
         let layout = source.layout();
-        let drawn = Drawn { view, transfer, source, store };
-        let mut search = Search::new(&drawn);
+        let mut search = Search::new((view, transfer), (source, store));
         let mut joined = tolerant(source, transfer, f64::INFINITY);
         let found = loop {
             let (nodes, bricks) = in_view(layout, view, &joined);

@@ -34,7 +34,7 @@ use volery_scene::{Camera, Projection, TransferFunction};
 
 use super::losses::{Losses, cell_length};
 use crate::interest::weight_of;
-use crate::residency::Store;
+use crate::residency::{self, Store};
 use crate::session::RenderError;
 use crate::view::View;
 
@@ -52,9 +52,7 @@ pub(crate) struct Choice<'a> {
 
 impl Choice<'_> {
     fn brick_bytes(&self, node: Node) -> u64 {
-        // At most brick_cells + 1 samples, which fits.
-        let samples = self.source.layout().brick_shape(node).count.map(|n| n as u32);
-        self.backend.brick_bytes(&self.store.layout, samples)
+        residency::device_bytes(self.source, self.store, node, self.backend)
     }
 
     /// Whether nodes fit a budget.
